@@ -1,0 +1,166 @@
+//! What a solve gives back.
+
+use crate::Mat;
+use crate::expression::{Expr, Unknown};
+use serde::Serialize;
+
+/// How a solve ended.
+#[derive(Clone, Debug, Serialize)]
+pub enum Outcome {
+    /// Optimal: the relative duality gap is at most 1e-7 (by default it aims for 1e-9), the residuals are within
+    /// tolerance, and the smallest eigenvalue of every block, recomputed from the data as stated, is positive for
+    /// strict inequalities, at least the margin (up to rounding) where one was given, and for [`Sdp`](crate::sdpa::Sdp)
+    /// at least −tolerance·(1 + ‖F₀‖).
+    Solved,
+    /// No point satisfies all inequalities; the witness shows why.
+    Infeasible(Witness),
+    /// The objective improves without end along the ray.
+    Unbounded(Ray),
+    /// The solver stopped short. The answer holds the best point so far with its true residuals.
+    Inaccurate(InaccurateReason),
+}
+
+/// A proof that no x satisfies all inequalities `F_b(x) = C_b + Σ xᵢ F_{b,i} ⪰ 0`.
+///
+/// Matrices `Z_b ⪰ 0` with `Σ_b⟨C_b, Z_b⟩ = −1` and `Σ_b⟨F_{b,i}, Z_b⟩ = 0` for every i: then
+/// `Σ_b⟨F_b(x), Z_b⟩ = −1` for all x, though it could not be negative if every `F_b(x)` were positive semidefinite.
+#[derive(Clone, Debug, Serialize)]
+pub struct Witness {
+    /// `Z_b` for every inequality in the order stated, symmetric positive semidefinite.
+    #[serde(serialize_with = "nested_rows")]
+    pub multipliers: Vec<Mat<f64>>,
+    /// Largest `|Σ_b⟨F_{b,i}, Z_b⟩|` over i, recomputed. Zero in exact arithmetic; the witness excludes all x with
+    /// `Σ|xᵢ| < 1/residual`.
+    pub residual: f64,
+    /// Smallest eigenvalue over all `Z_b`, recomputed. Not negative beyond rounding.
+    pub smallest_eigenvalue: f64,
+}
+
+/// A direction along which every inequality stays satisfied and the objective improves.
+///
+/// `Σ dᵢ F_{b,i} ⪰ 0` for every block, while the objective changes by −1 (minimised) or +1 (maximised) per unit step.
+#[derive(Clone, Debug, Serialize)]
+pub struct Ray {
+    /// The direction, one matrix per unknown in the order made.
+    #[serde(serialize_with = "nested_rows")]
+    pub direction: Vec<Mat<f64>>,
+    /// Smallest eigenvalue over all blocks of the linear part at the direction, recomputed, relative to
+    /// the largest. Not negative beyond rounding.
+    pub smallest_eigenvalue: f64,
+}
+
+/// Why a solve stopped short.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum InaccurateReason {
+    /// The iteration limit was reached.
+    IterationLimit,
+    /// The time limit was reached.
+    TimeLimit,
+    /// The caller cancelled.
+    Cancelled,
+    /// Rounding errors stopped progress: the problem has no interior, or is badly conditioned.
+    Stalled,
+    /// The solver converged, but a block recomputed from the data is not positive definite by its margin.
+    NotVerified,
+}
+
+/// One inequality at the answer.
+#[derive(Clone, Debug, Serialize)]
+pub struct BlockReport {
+    /// The inequality's name.
+    pub name: String,
+    /// Rows of the block.
+    pub size: usize,
+    /// Smallest eigenvalue of F(x), recomputed from the expression and not from the solver's variables.
+    pub smallest_eigenvalue: f64,
+    /// The margin imposed: F(x) ⪰ margin·I.
+    pub margin: f64,
+}
+
+/// Residuals of the answer, relative to the data.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Residuals {
+    /// By how much the blocks differ from the solver's positive definite slack:
+    /// max_b ‖F_b(x) − S_b‖ / (1 + ‖C_b‖), Frobenius norms.
+    pub primal: f64,
+    /// ‖c − A(Z)‖ / (1 + ‖c‖) in the largest absolute entry, `A(Z)ᵢ = Σ_b⟨F_{b,i}, Z_b⟩`.
+    pub dual: f64,
+    /// |p − d| / (1 + |p| + |d|) for the objective p and the dual objective d.
+    pub gap: f64,
+}
+
+/// One interior-point iteration, as it began.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct IterationLog {
+    /// Objective at x.
+    pub objective: f64,
+    /// Dual objective at Z.
+    pub dual_objective: f64,
+    /// Residuals at (x, S, Z).
+    pub residuals: Residuals,
+    /// Complementarity ⟨S, Z⟩ / n.
+    pub complementarity: f64,
+    /// Centring parameter σ of the step then taken.
+    pub centring: f64,
+    /// Length of the step in x and S.
+    pub primal_step: f64,
+    /// Length of the step in Z.
+    pub dual_step: f64,
+}
+
+/// The result of [`Problem::solve`](crate::Problem::solve).
+#[derive(Clone, Debug, Serialize)]
+pub struct Answer {
+    /// How the solve ended.
+    pub outcome: Outcome,
+    /// The objective at the answer.
+    pub objective: f64,
+    /// The dual objective: for a dual point without residual, a bound on the objective of every feasible point.
+    pub dual_objective: f64,
+    /// |objective − dual_objective|.
+    pub gap: f64,
+    /// Every inequality, in the order stated.
+    pub blocks: Vec<BlockReport>,
+    /// Residuals of the answer.
+    pub residuals: Residuals,
+    /// The course of the iteration.
+    pub iterations: Vec<IterationLog>,
+    /// Multipliers `Z_b ⪰ 0` of the inequalities, in the order stated.
+    #[serde(serialize_with = "nested_rows")]
+    pub multipliers: Vec<Mat<f64>>,
+    #[serde(skip)]
+    pub(crate) unknowns: Vec<Unknown>,
+    #[serde(rename = "unknowns", serialize_with = "nested_rows")]
+    pub(crate) values: Vec<Mat<f64>>,
+}
+
+impl Answer {
+    /// The value of each unknown, in the order made; for an [`Sdp`](crate::sdpa::Sdp) the one column x.
+    pub fn unknown_values(&self) -> &[Mat<f64>] {
+        &self.values
+    }
+
+    /// The value of any expression at the answer.
+    ///
+    /// # Panics
+    ///
+    /// When the expression holds an unknown of another problem, or one made after the solve.
+    pub fn value(&self, expression: &Expr) -> Mat<f64> {
+        expression.evaluate(&|unknown| {
+            assert!(
+                self.unknowns.get(unknown.index) == Some(&unknown),
+                "value of an expression with a {} × {} unknown that the solved problem does not have",
+                unknown.rows,
+                unknown.cols
+            );
+            &self.values[unknown.index]
+        })
+    }
+}
+
+/// Matrices as lists of rows.
+fn nested_rows<S: serde::Serializer>(matrices: &[Mat<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(matrices.iter().map(|m| -> Vec<Vec<f64>> {
+        (0..m.nrows()).map(|i| (0..m.ncols()).map(|j| m[(i, j)]).collect()).collect()
+    }))
+}

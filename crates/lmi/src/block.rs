@@ -1,0 +1,172 @@
+//! The solver's form of a problem: minimise cᵀx subject to `F_b(x) = C_b + Σ xᵢ F_{b,i} ⪰ 0`.
+
+use crate::factored::{Factored, FactoredScratch};
+use crate::sparse::{Sparse, SparseScratch};
+
+/// A problem in the solver's form.
+#[derive(Debug)]
+pub(crate) struct Program {
+    /// c.
+    pub objective: Vec<f64>,
+    pub blocks: Vec<Block>,
+}
+
+/// One block F_b.
+#[derive(Debug)]
+pub(crate) enum Block {
+    Dense(DenseBlock),
+    Diagonal(DiagonalBlock),
+}
+
+/// A block whose value is a full symmetric matrix, stored column by column.
+#[derive(Debug)]
+pub(crate) struct DenseBlock {
+    pub size: usize,
+    pub constant: Vec<f64>,
+    pub factored: Factored,
+    pub sparse: Sparse,
+}
+
+/// A block whose value is a diagonal matrix, stored as its diagonal.
+#[derive(Debug)]
+pub(crate) struct DiagonalBlock {
+    pub constant: Vec<f64>,
+    /// For each row the (unknown, coefficient) pairs.
+    rows: Vec<Vec<(usize, f64)>>,
+}
+
+/// Scratch memory of one block's operator.
+#[derive(Debug, Default)]
+pub(crate) struct OperatorScratch {
+    factored: FactoredScratch,
+    sparse: SparseScratch,
+    mixed: Vec<f64>,
+}
+
+impl DiagonalBlock {
+    /// From (unknown, coefficient) pairs for each row, in any order; repeated unknowns add up.
+    pub fn new(constant: Vec<f64>, mut rows: Vec<Vec<(usize, f64)>>) -> Self {
+        for row in &mut rows {
+            row.sort_by_key(|(unknown, _)| *unknown);
+            row.dedup_by(|later, earlier| {
+                let same = later.0 == earlier.0;
+                if same {
+                    earlier.1 += later.1;
+                }
+                same
+            });
+            row.retain(|(_, value)| *value != 0.0);
+        }
+        Self { constant, rows }
+    }
+}
+
+impl Block {
+    pub fn size(&self) -> usize {
+        match self {
+            Self::Dense(block) => block.size,
+            Self::Diagonal(block) => block.constant.len(),
+        }
+    }
+
+    /// C_b, column by column or its diagonal alone.
+    pub fn constant(&self) -> &[f64] {
+        match self {
+            Self::Dense(block) => &block.constant,
+            Self::Diagonal(block) => &block.constant,
+        }
+    }
+
+    pub fn is_diagonal(&self) -> bool {
+        matches!(self, Self::Diagonal(_))
+    }
+
+    pub fn scratch(&self, unknowns: usize) -> OperatorScratch {
+        match self {
+            Self::Dense(block) => OperatorScratch {
+                factored: block.factored.scratch(),
+                sparse: block.sparse.scratch(),
+                mixed: if block.factored.is_empty() || block.sparse.is_empty() { vec![] } else { vec![0.0; unknowns] },
+            },
+            Self::Diagonal(_) => OperatorScratch::default(),
+        }
+    }
+
+    /// out ← out + Σ xᵢ F_i.
+    pub fn apply(&self, x: &[f64], out: &mut [f64], scratch: &mut OperatorScratch) {
+        match self {
+            Self::Dense(block) => {
+                block.factored.apply(x, out, &mut scratch.factored);
+                block.sparse.apply(x, out);
+            }
+            Self::Diagonal(block) => {
+                for (out, row) in out.iter_mut().zip(&block.rows) {
+                    *out += row.iter().map(|&(unknown, value)| value * x[unknown]).sum::<f64>();
+                }
+            }
+        }
+    }
+
+    /// out_i ← out_i + factor·⟨F_i, H⟩ for symmetric H.
+    pub fn adjoint(&self, factor: f64, h: &[f64], out: &mut [f64], scratch: &mut OperatorScratch) {
+        match self {
+            Self::Dense(block) => {
+                block.factored.adjoint(factor, h, out, &mut scratch.factored);
+                block.sparse.adjoint(factor, h, out);
+            }
+            Self::Diagonal(block) => {
+                for (h, row) in h.iter().zip(&block.rows) {
+                    row.iter().for_each(|&(unknown, value)| out[unknown] += factor * value * h);
+                }
+            }
+        }
+    }
+
+    /// out_i ← max(out_i, ‖F_i‖_F), the norm estimated for factored blocks.
+    pub fn norms(&self, out: &mut [f64]) {
+        match self {
+            Self::Dense(block) => {
+                block.factored.norms(out);
+                block.sparse.norms(out);
+            }
+            Self::Diagonal(block) => {
+                let mut squares = vec![0.0; out.len()];
+                for &(unknown, value) in block.rows.iter().flatten() {
+                    squares[unknown] += value * value;
+                }
+                out.iter_mut().zip(squares).for_each(|(out, square)| *out = out.max(square.sqrt()));
+            }
+        }
+    }
+
+    /// M ← M + tr(F_i P F_j Z), lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
+    pub fn schur(&self, p: &[f64], z: &[f64], m: &mut [f64], unknowns: usize, scratch: &mut OperatorScratch) {
+        match self {
+            Self::Dense(block) => {
+                let OperatorScratch { factored, sparse, mixed } = scratch;
+                if !block.factored.is_empty() {
+                    block.factored.schur(p, z, m, unknowns, factored);
+                }
+                let both = !block.factored.is_empty();
+                block.sparse.schur(p, z, m, unknowns, sparse, both, |unknown, h, m| {
+                    mixed.fill(0.0);
+                    block.factored.adjoint(1.0, h, mixed, factored);
+                    for (other, value) in mixed.iter().enumerate() {
+                        // An unknown with both a sparse and a factored part meets itself from both sides.
+                        let value = if other == unknown { 2.0 * value } else { *value };
+                        m[other.max(unknown) + other.min(unknown) * unknowns] += value;
+                    }
+                });
+            }
+            Self::Diagonal(block) => {
+                for ((p, z), row) in p.iter().zip(z).zip(&block.rows) {
+                    for (at, &(low, a)) in row.iter().enumerate() {
+                        for &(high, b) in &row[at..] {
+                            m[high + low * unknowns] += a * b * p * z;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! The primal-dual interior-point iteration: Mehrotra's predictor-corrector with the HKM direction from an infeasible start.
+//!
+//! Helmberg, Rendl, Vanderbei and Wolkowicz (SIAM J. Optim. 6, 1996); Kojima, Shindoh and Hara (SIAM J. Optim. 7, 1997); Borchers (CSDP,
+//! Optim. Methods Softw. 11, 1999). The direction does not change when a block is replaced by a congruent one
+//! or the unknowns by linear combinations, so that scaling matters for the starting point and the stopping rule only.
+
+use crate::answer::{InaccurateReason, IterationLog, Residuals};
+use crate::block::Program;
+use crate::dense::{Scratch, dot, norm};
+use crate::direction::BlockState;
+use crate::lanczos::Lanczos;
+use crate::schur::Schur;
+use crate::{Options, start};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// Largest relative gap of a point that is called solved.
+const SOLVED_GAP: f64 = 1e-7;
+/// A multiplier is a witness of infeasibility when its residual is this small against the dual objective.
+const CERTIFICATE: f64 = 1e-8;
+
+/// Rounds of refinement of one direction at most.
+const REFINEMENTS: usize = 4;
+
+/// A point of the iteration.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Point {
+    pub x: Vec<f64>,
+    pub z: Vec<Vec<f64>>,
+}
+
+/// How the iteration ended.
+#[derive(Clone, Debug)]
+pub(crate) enum Ending {
+    Converged,
+    /// The point's multipliers exclude every x.
+    PrimalInfeasible,
+    /// The objective falls for ever along this direction of x.
+    DualInfeasible(Vec<f64>),
+    Stopped(InaccurateReason),
+}
+
+/// The last or best point, and how it was reached.
+#[derive(Debug)]
+pub(crate) struct Solution {
+    pub point: Point,
+    pub ending: Ending,
+    pub residuals: Residuals,
+    pub dual_objective: f64,
+    pub log: Vec<IterationLog>,
+}
+
+/// Everything the iteration works on.
+struct Iteration<'a> {
+    program: &'a Program,
+    options: &'a Options,
+    blocks: Vec<BlockState>,
+    x: Vec<f64>,
+    /// A(Z).
+    az: Vec<f64>,
+    schur: Schur,
+    scratch: Scratch,
+    lanczos: Lanczos,
+    right_side: Vec<f64>,
+    dx: Vec<f64>,
+    change: Vec<f64>,
+    /// Σ of block sizes.
+    order: f64,
+    /// Whether S = F(x) exactly.
+    feasible: bool,
+    constant_norms: Vec<f64>,
+    objective_norm: f64,
+}
+
+/// Where a point stands.
+#[derive(Clone, Copy, Debug)]
+struct Status {
+    objective: f64,
+    dual_objective: f64,
+    residuals: Residuals,
+    mu: f64,
+}
+
+impl Status {
+    /// At most 1 for a point that may be called solved.
+    fn merit(&self, options: &Options) -> f64 {
+        let Residuals { primal, dual, gap } = self.residuals;
+        let feasibility = primal.max(dual) / options.feasibility_tolerance;
+        let merit = feasibility.max(gap / SOLVED_GAP);
+        if merit.is_nan() { f64::INFINITY } else { merit }
+    }
+}
+
+/// Solves a program in the solver's form.
+pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
+    let started = Instant::now();
+    let mut it = Iteration::new(program, options);
+    let mut log: Vec<IterationLog> = Vec::new();
+    let mut best: Option<(f64, Status, Point)> = None;
+    let mut since_progress = 0;
+    let mut best_witness = f64::INFINITY;
+    let ending = loop {
+        it.update_residuals();
+        let status = it.status();
+        let merit = status.merit(options);
+        let improves = best.as_ref().is_none_or(|(best, ..)| merit < *best);
+        let much = best.as_ref().is_none_or(|(best, ..)| merit < 0.9 * best);
+        if improves {
+            best = Some((merit, status, it.point()));
+        }
+        log.push(IterationLog {
+            objective: status.objective,
+            dual_objective: status.dual_objective,
+            residuals: status.residuals,
+            complementarity: status.mu,
+            centring: 0.0,
+            primal_step: 0.0,
+            dual_step: 0.0,
+        });
+        let Residuals { primal, dual, gap } = status.residuals;
+        let tolerance = options.feasibility_tolerance;
+        if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance {
+            break Ending::Converged;
+        }
+        let witness = it.witness_residual(&status);
+        if witness <= CERTIFICATE {
+            best = Some((merit, status, it.point()));
+            break Ending::PrimalInfeasible;
+        }
+        if let Some(ray) = it.ray(&status) {
+            best = Some((merit, status, it.point()));
+            break Ending::DualInfeasible(ray);
+        }
+        since_progress = if much || witness < 0.9 * best_witness { 0 } else { since_progress + 1 };
+        best_witness = best_witness.min(witness);
+        if let Some(reason) = it.interrupted(log.len(), since_progress, started) {
+            break Ending::Stopped(reason);
+        }
+        match it.step(&status) {
+            Some((centring, primal_step, dual_step)) => {
+                if let Some(entry) = log.last_mut() {
+                    (entry.centring, entry.primal_step, entry.dual_step) = (centring, primal_step, dual_step);
+                }
+            }
+            None => break Ending::Stopped(InaccurateReason::Stalled),
+        }
+    };
+    let (merit, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));
+    let ending = match ending {
+        Ending::Stopped(_) if merit <= 1.0 => Ending::Converged,
+        other => other,
+    };
+    Solution {
+        point,
+        ending,
+        residuals: status.residuals,
+        dual_objective: status.dual_objective,
+        log,
+    }
+}
+
+impl<'a> Iteration<'a> {
+    fn new(program: &'a Program, options: &'a Options) -> Self {
+        let unknowns = program.objective.len();
+        let scales = start::scales(program);
+        let blocks: Vec<BlockState> = program
+            .blocks
+            .iter()
+            .zip(scales)
+            .map(|(block, (eta, xi))| BlockState::new(block, unknowns, eta, xi))
+            .collect();
+        let largest = program.blocks.iter().filter(|b| !b.is_diagonal()).map(|b| b.size()).max().unwrap_or(1);
+        Self {
+            program,
+            options,
+            x: vec![0.0; unknowns],
+            az: vec![0.0; unknowns],
+            schur: Schur::new(unknowns),
+            scratch: Scratch::new(largest),
+            lanczos: Lanczos::new(largest),
+            right_side: vec![0.0; unknowns],
+            dx: vec![0.0; unknowns],
+            change: vec![0.0; unknowns],
+            order: blocks.iter().map(|b| b.n as f64).sum(),
+            feasible: false,
+            constant_norms: program.blocks.iter().map(|b| norm(b.constant())).collect(),
+            objective_norm: program.objective.iter().fold(0.0, |m, c| m.max(c.abs())),
+            blocks,
+        }
+    }
+
+    fn point(&self) -> Point {
+        Point { x: self.x.clone(), z: self.blocks.iter().map(|b| b.z.clone()).collect() }
+    }
+
+    /// R = F(x) − S, closed exactly as soon as F(x) itself is positive definite; A(Z).
+    fn update_residuals(&mut self) {
+        let mut closed = true;
+        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+            state.update_residual(block, &self.x);
+        }
+        let worst = self.primal_residual();
+        if self.feasible || worst <= 1e-7 {
+            for state in &mut self.blocks {
+                closed &= state.close_residual(&mut self.scratch);
+            }
+            self.feasible = closed;
+        }
+        self.az.fill(0.0);
+        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+            block.adjoint(1.0, &state.z, &mut self.az, &mut state.operator);
+        }
+    }
+
+    fn primal_residual(&self) -> f64 {
+        let relative = self.blocks.iter().zip(&self.constant_norms).map(|(b, c)| norm(&b.residual) / (1.0 + c));
+        relative.fold(0.0, nan_max)
+    }
+
+    fn status(&self) -> Status {
+        let objective = dot(&self.program.objective, &self.x);
+        let dual_objective =
+            -self.program.blocks.iter().zip(&self.blocks).map(|(b, s)| dot(b.constant(), &s.z)).sum::<f64>();
+        let complementarity: f64 = self.blocks.iter().map(|b| dot(&b.s, &b.z)).sum();
+        let dual = self.program.objective.iter().zip(&self.az).map(|(c, a)| (c - a).abs()).fold(0.0, nan_max);
+        let residuals = Residuals {
+            primal: self.primal_residual(),
+            dual: dual / (1.0 + self.objective_norm),
+            gap: (objective - dual_objective).abs() / (1.0 + objective.abs() + dual_objective.abs()),
+        };
+        Status { objective, dual_objective, residuals, mu: complementarity / self.order }
+    }
+
+    /// How far the multipliers, scaled to a dual objective of 1 without the objective c, are from excluding every x.
+    fn witness_residual(&self, status: &Status) -> f64 {
+        if self.feasible || status.dual_objective.is_nan() || status.dual_objective <= 0.0 {
+            return f64::INFINITY;
+        }
+        let residual = self.az.iter().fold(0.0, |m: f64, a| nan_max(m, a.abs()));
+        residual / status.dual_objective
+    }
+
+    /// A direction of x without end: x itself, grown large.
+    fn ray(&self, status: &Status) -> Option<Vec<f64>> {
+        if status.objective.is_nan() || status.objective >= 0.0 || status.residuals.dual <= 1e-6 {
+            return None;
+        }
+        let far = -status.objective;
+        // F(x) − F(0) = S + R − C, and S is positive definite.
+        let defect = self.blocks.iter().zip(&self.constant_norms).map(|(b, c)| (norm(&b.residual) + c) / far);
+        (defect.fold(0.0, nan_max) <= CERTIFICATE).then(|| self.x.iter().map(|x| x / far).collect())
+    }
+
+    fn interrupted(&self, iterations: usize, since_progress: usize, started: Instant) -> Option<InaccurateReason> {
+        let cancelled = |flag: &std::sync::Arc<std::sync::atomic::AtomicBool>| flag.load(Ordering::Relaxed);
+        if self.options.cancel.as_ref().is_some_and(cancelled) {
+            return Some(InaccurateReason::Cancelled);
+        }
+        if self.options.time_limit.is_some_and(|limit| started.elapsed() >= limit) {
+            return Some(InaccurateReason::TimeLimit);
+        }
+        if iterations > self.options.max_iterations {
+            return Some(InaccurateReason::IterationLimit);
+        }
+        (since_progress > 15).then_some(InaccurateReason::Stalled)
+    }
+
+    /// One predictor-corrector step: (centring, primal step, dual step), or `None` when no step can be taken.
+    fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
+        let unknowns = self.x.len();
+        self.schur.matrix.fill(0.0);
+        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+            state.invert(&mut self.scratch);
+            let BlockState { s_inverse, z, operator, .. } = state;
+            block.schur(s_inverse, z, &mut self.schur.matrix, unknowns, operator);
+        }
+        if !self.schur.factorize() {
+            return None;
+        }
+        let feasible = self.feasible;
+        self.blocks.iter_mut().for_each(|state| state.begin_predictor(feasible));
+        self.direction();
+        let (primal, dual) = self.longest_steps(0.3);
+        let (primal, dual) = (primal.min(1.0), dual.min(1.0));
+        let reached: f64 = self.blocks.iter().map(|b| b.complementarity(primal, dual)).sum::<f64>() / self.order;
+        let ratio = (reached / status.mu).clamp(0.0, 1.0);
+        let exponent = (3.0 * primal.min(dual).powi(2)).max(1.0);
+        let sigma = ratio.powf(exponent).clamp(1e-6, 1.0);
+        self.blocks.iter_mut().for_each(|state| state.begin_corrector(sigma * status.mu));
+        self.direction();
+        self.refine();
+        let fraction = 0.9 + 0.09 * primal.min(dual);
+        let (primal, dual) = self.longest_steps(0.05);
+        let (primal, dual) = ((fraction * primal).min(1.0), (fraction * dual).min(1.0));
+        let primal = self.safeguard(primal, BlockState::try_primal)?;
+        let dual = self.safeguard(dual, BlockState::try_dual)?;
+        self.blocks.iter_mut().for_each(|state| state.advance(primal, dual));
+        crate::dense::axpy(primal, &self.dx, &mut self.x);
+        Some((sigma, primal, dual))
+    }
+
+    /// dx, dS and dZ for the right side that the blocks hold.
+    fn direction(&mut self) {
+        self.right_side.iter_mut().zip(&self.program.objective).for_each(|(r, c)| *r = -c);
+        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+            state.add_right_side(block, &mut self.right_side);
+        }
+        self.schur.solve(&self.right_side, &mut self.dx);
+        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+            state.complete(block, &self.dx, self.feasible);
+        }
+    }
+
+    /// Iterative refinement of the direction against the dual equations A(Z + dZ) = c themselves: close to the optimum S⁻¹ is
+    /// large, and what rounding leaves of the equations in `sym(P F(dx) Z)` would otherwise add up in Z.
+    fn refine(&mut self) {
+        let mut last = f64::INFINITY;
+        for _ in 0..REFINEMENTS {
+            self.right_side.copy_from_slice(&self.program.objective);
+            for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+                state.subtract_dual(block, &mut self.right_side);
+            }
+            let size = self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs())) / (1.0 + self.objective_norm);
+            if size.is_nan() || size <= 1e-3 * self.options.feasibility_tolerance || size > 0.3 * last {
+                return;
+            }
+            last = size;
+            self.right_side.iter_mut().for_each(|r| *r = -*r);
+            self.schur.solve(&self.right_side, &mut self.change);
+            crate::dense::axpy(1.0, &self.change, &mut self.dx);
+            for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+                state.refine(block, &self.change);
+            }
+        }
+    }
+
+    fn longest_steps(&mut self, accuracy: f64) -> (f64, f64) {
+        let (mut primal, mut dual) = (f64::INFINITY, f64::INFINITY);
+        for state in &self.blocks {
+            let (p, d) = state.longest_steps(&mut self.lanczos, accuracy);
+            (primal, dual) = (primal.min(p), dual.min(d));
+        }
+        (primal, dual)
+    }
+
+    /// Shortens a step until every block stays positive definite.
+    fn safeguard(&mut self, mut step: f64, attempt: fn(&mut BlockState, f64, &mut Scratch) -> bool) -> Option<f64> {
+        for _ in 0..40 {
+            if step < 1e-9 {
+                return None;
+            }
+            if self.blocks.iter_mut().all(|state| attempt(state, step, &mut self.scratch)) {
+                return Some(step);
+            }
+            step *= 0.8;
+        }
+        None
+    }
+}
+
+/// The larger one, or NaN when either is.
+fn nan_max(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}

@@ -1,0 +1,120 @@
+//! How far one can go from a positive definite matrix along a symmetric direction.
+//!
+//! The largest α with `S + αD ⪰ 0` is −1/λ for λ the smallest eigenvalue of S⁻¹D, when that is negative. S⁻¹D is self-adjoint in
+//! the inner product of S, so that the Lanczos iteration in that inner product needs products with D and S⁻¹ only:
+//! two matrix-vector products a step, no eigendecomposition. (Toh, SIAM J. Optim. 12, 2002, for the bound.)
+
+use crate::dense::{apply, axpy, dot};
+
+/// Most steps of one estimate. The result is safe-guarded by a Cholesky factorisation, so that few suffice.
+const STEPS: usize = 30;
+
+/// Scratch memory for matrices up to a size.
+#[derive(Debug)]
+pub(crate) struct Lanczos {
+    v: Vec<f64>,
+    sv: Vec<f64>,
+    sv_before: Vec<f64>,
+    w: Vec<f64>,
+    u: Vec<f64>,
+}
+
+impl Lanczos {
+    pub fn new(n: usize) -> Self {
+        Self { v: vec![0.0; n], sv: vec![0.0; n], sv_before: vec![0.0; n], w: vec![0.0; n], u: vec![0.0; n] }
+    }
+
+    /// A lower estimate, to the relative `accuracy`, of the largest α with `S + αD ⪰ 0`; infinite when the estimate finds no end.
+    ///
+    /// Given are S itself, its inverse and D, symmetric n × n.
+    pub fn step(&mut self, n: usize, s: &[f64], s_inverse: &[f64], d: &[f64], accuracy: f64) -> f64 {
+        let Self { v, sv, sv_before, w, u } = self;
+        let (v, sv, sv_before) = (&mut v[..n], &mut sv[..n], &mut sv_before[..n]);
+        let (w, u) = (&mut w[..n], &mut u[..n]);
+        // A fixed start without pattern.
+        for (i, v) in v.iter_mut().enumerate() {
+            *v = 1.0 + 0.5 * ((i * i + 3 * i + 1) % 7) as f64 / 7.0 - if i % 2 == 1 { 0.3 } else { 0.0 };
+        }
+        apply(n, s, v, sv);
+        let length = dot(v, sv).sqrt();
+        if !(length > 0.0 && length.is_finite()) {
+            return 0.0;
+        }
+        v.iter_mut().chain(sv.iter_mut()).for_each(|x| *x /= length);
+        sv_before.fill(0.0);
+        let (mut alphas, mut betas) = ([0.0; STEPS], [0.0; STEPS]);
+        let mut smallest = f64::NAN;
+        for k in 0..STEPS.min(n) {
+            apply(n, d, v, w);
+            if k > 0 {
+                axpy(-betas[k - 1], sv_before, w);
+            }
+            let alpha = dot(w, v);
+            axpy(-alpha, sv, w);
+            apply(n, s_inverse, w, u);
+            let square = dot(u, w);
+            if !(alpha.is_finite() && square.is_finite()) {
+                return 0.0;
+            }
+            let beta = square.max(0.0).sqrt();
+            alphas[k] = alpha;
+            betas[k] = beta;
+            let last = k + 1 == STEPS.min(n) || beta <= 1e-12 * alphas[0].abs();
+            if last || (k >= 3 && k % 2 == 1) {
+                let (value, component) = smallest_of_tridiagonal(&alphas[..=k], &betas[..k]);
+                // Some eigenvalue lies within `residual` of the Ritz value.
+                let residual = if k + 1 == n { 0.0 } else { beta * component };
+                smallest = value - residual;
+                if last || residual <= accuracy * value.abs() || (value > -1e-1 && value - residual > -0.5) {
+                    break;
+                }
+            }
+            sv_before.copy_from_slice(sv);
+            let inverse = 1.0 / beta;
+            v.iter_mut().zip(u.iter()).for_each(|(v, u)| *v = u * inverse);
+            sv.iter_mut().zip(w.iter()).for_each(|(sv, w)| *sv = w * inverse);
+        }
+        if smallest < 0.0 { -1.0 / smallest } else { f64::INFINITY }
+    }
+}
+
+/// The smallest eigenvalue of a symmetric tridiagonal matrix to about 1e-4 of its spread, and the last component (absolute) of its
+/// normalised eigenvector.
+fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> (f64, f64) {
+    let k = diagonal.len();
+    let radius = |i: usize| {
+        let left = if i > 0 { off[i - 1].abs() } else { 0.0 };
+        let right = if i + 1 < k { off[i].abs() } else { 0.0 };
+        left + right
+    };
+    let mut low = (0..k).map(|i| diagonal[i] - radius(i)).fold(f64::INFINITY, f64::min);
+    let mut high = diagonal.iter().copied().fold(f64::INFINITY, f64::min);
+    // Sturm: the pivots of T − λI are all positive exactly when λ is below the spectrum.
+    let below = |lambda: f64| {
+        let mut pivot = diagonal[0] - lambda;
+        for i in 1..k {
+            if pivot <= 0.0 {
+                return false;
+            }
+            pivot = diagonal[i] - lambda - off[i - 1] * off[i - 1] / pivot;
+        }
+        pivot > 0.0
+    };
+    for _ in 0..40 {
+        if high - low <= 1e-3 * low.abs().max(high.abs()) {
+            break;
+        }
+        let middle = 0.5 * (low + high);
+        if below(middle) { low = middle } else { high = middle }
+    }
+    // The eigenvector by its recurrence from the first component on.
+    let (mut before, mut now, mut sum) = (0.0, 1.0, 1.0);
+    for i in 0..k - 1 {
+        let previous = if i > 0 { off[i - 1] * before } else { 0.0 };
+        let next = if off[i] != 0.0 { ((low - diagonal[i]) * now - previous) / off[i] } else { 0.0 };
+        (before, now) = (now, next);
+        sum += now * now;
+    }
+    let component = if sum.is_finite() { now.abs() / sum.sqrt() } else { 1.0 };
+    (low, component)
+}

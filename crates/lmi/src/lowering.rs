@@ -1,0 +1,396 @@
+//! From expressions to the solver's form: every block as `C + Σ_g (U_g X_g V_gᵀ + V_g X_gᵀ U_gᵀ)`.
+//!
+//! A symmetric block F equals ½(F + Fᵀ), so that a term `U X V` stands for `½(U X V + Vᵀ Xᵀ Uᵀ)`. Terms whose unknowns meet
+//! the same right factor are stacked, `U₁ X₁ Vᵀ + U₂ X₂ Vᵀ = [U₁ U₂] [X₁; X₂] Vᵀ`; in `AY + YAᵀ − BL − LᵀBᵀ` and most
+//! LMIs of control that leaves one stack per block.
+
+use crate::block::{Block, DenseBlock, DiagonalBlock, Program};
+use crate::expression::{Expr, Shape, Term, Unknown};
+use crate::factored::{Factored, Stack};
+use crate::problem::{Inequality, Sense};
+use crate::sparse::{Entry, Sparse};
+use crate::{Error, Mat, Options, verification};
+
+/// Where the scalars of each matrix unknown stand in the vector x: a rectangular unknown row by row, of a symmetric
+/// one the lower triangle row by row.
+#[derive(Debug)]
+pub(crate) struct Layout {
+    unknowns: Vec<Unknown>,
+    starts: Vec<usize>,
+    len: usize,
+}
+
+impl Layout {
+    pub fn new(unknowns: &[Unknown]) -> Self {
+        let mut len = 0;
+        let mut starts = Vec::with_capacity(unknowns.len());
+        for unknown in unknowns {
+            starts.push(len);
+            len += if unknown.symmetric { unknown.rows * (unknown.rows + 1) / 2 } else { unknown.rows * unknown.cols };
+        }
+        Self { unknowns: unknowns.to_vec(), starts, len }
+    }
+
+    /// Number of scalar unknowns.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Position of entry (i, j) of an unknown.
+    pub fn position(&self, unknown: Unknown, i: usize, j: usize) -> usize {
+        let start = self.starts[unknown.index];
+        if unknown.symmetric {
+            let (i, j) = if i >= j { (i, j) } else { (j, i) };
+            start + i * (i + 1) / 2 + j
+        } else {
+            start + i * unknown.cols + j
+        }
+    }
+
+    /// The unknowns as matrices.
+    pub fn matrices(&self, x: &[f64]) -> Vec<Mat<f64>> {
+        let entry = |unknown: Unknown| move |i, j| x[self.position(unknown, i, j)];
+        self.unknowns.iter().map(|&u| Mat::from_fn(u.rows, u.cols, entry(u))).collect()
+    }
+
+    /// From a gradient with respect to each matrix to the gradient with respect to x: the entries (i, j) and (j, i) of
+    /// a symmetric unknown are one scalar.
+    pub fn scalars(&self, gradients: &[Mat<f64>]) -> Vec<f64> {
+        let mut out = vec![0.0; self.len];
+        for (&unknown, gradient) in self.unknowns.iter().zip(gradients) {
+            for i in 0..unknown.rows {
+                for j in 0..unknown.cols {
+                    out[self.position(unknown, i, j)] += gradient[(i, j)];
+                }
+            }
+        }
+        out
+    }
+}
+
+/// A problem in the solver's form, with what is needed to read its answer.
+#[derive(Debug)]
+pub(crate) struct Lowered {
+    pub program: Program,
+    pub layout: Layout,
+    /// Margin imposed on each inequality.
+    pub margins: Vec<f64>,
+    pub objective_constant: f64,
+    /// 1 to minimise, −1 to maximise: objective = constant + sign · cᵀx.
+    pub sign: f64,
+}
+
+/// Checks the problem and brings it into the solver's form.
+pub(crate) fn lower(
+    problem: u64,
+    unknowns: &[Unknown],
+    inequalities: &[Inequality],
+    objective: Option<&(Sense, Expr)>,
+    options: &Options,
+) -> Result<Lowered, Error> {
+    if inequalities.is_empty() {
+        return Err(Error::NoConstraint);
+    }
+    let layout = Layout::new(unknowns);
+    check_size(layout.len())?;
+    let mut blocks = Vec::with_capacity(inequalities.len());
+    let mut margins = Vec::with_capacity(inequalities.len());
+    for inequality in inequalities {
+        let place = format!("inequality \"{}\"", inequality.name);
+        check_expression(problem, &place, &inequality.expression)?;
+        check_symmetric(inequality, &layout)?;
+        let scale = verification::largest_entry(&inequality.expression.constant);
+        let margin = inequality.margin.unwrap_or(options.margin * if scale > 0.0 { scale } else { 1.0 });
+        if !margin.is_finite() {
+            return Err(Error::NotFinite { place: format!("the margin of {place}"), row: 0, column: 0, value: margin });
+        }
+        blocks.push(lower_block(&inequality.expression, margin, &layout));
+        margins.push(margin);
+    }
+    let (mut c, mut objective_constant, mut sign) = (vec![0.0; layout.len()], 0.0, 1.0);
+    if let Some((sense, expression)) = objective {
+        check_expression(problem, "the objective", expression)?;
+        if (expression.nrows(), expression.ncols()) != (1, 1) {
+            return Err(Error::ObjectiveNotScalar { rows: expression.nrows(), columns: expression.ncols() });
+        }
+        sign = if *sense == Sense::Minimize { 1.0 } else { -1.0 };
+        objective_constant = expression.constant[(0, 0)];
+        let mut gradients: Vec<Mat<f64>> = unknowns.iter().map(|u| Mat::zeros(u.rows, u.cols)).collect();
+        let one = Mat::from_fn(1, 1, |_, _| sign);
+        for term in expression.terms.iter() {
+            gradients[term.unknown.index] += verification::gradient(term, &one);
+        }
+        c = layout.scalars(&gradients);
+    }
+    let program = Program { objective: c, blocks };
+    Ok(Lowered { program, layout, margins, objective_constant, sign })
+}
+
+/// The Schur complement of this many unknowns takes 3.2 GB.
+const MOST_UNKNOWNS: usize = 20_000;
+
+pub(crate) fn check_size(unknowns: usize) -> Result<(), Error> {
+    if unknowns > MOST_UNKNOWNS {
+        return Err(Error::TooLarge { unknowns, allowed: MOST_UNKNOWNS });
+    }
+    Ok(())
+}
+
+fn check_expression(problem: u64, place: &str, expression: &Expr) -> Result<(), Error> {
+    if expression.terms.iter().any(|term| term.unknown.problem != problem) {
+        return Err(Error::ForeignUnknown { place: place.to_owned() });
+    }
+    let parts = expression.terms.iter().flat_map(|term| match &term.shape {
+        Shape::Product { left, right, .. } => [left, right],
+        Shape::Scaled { weights, matrix } => [weights, matrix],
+    });
+    for matrix in std::iter::once(&*expression.constant).chain(parts) {
+        for column in 0..matrix.ncols() {
+            for row in 0..matrix.nrows() {
+                let value = matrix[(row, column)];
+                if !value.is_finite() {
+                    return Err(Error::NotFinite { place: place.to_owned(), row, column, value });
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A linear map vanishes when it vanishes at a generic point: the known part and two fixed, patternless points are
+/// compared with their mirror images.
+fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error> {
+    let expression = &inequality.expression;
+    let (rows, columns) = (expression.nrows(), expression.ncols());
+    if rows != columns {
+        return Err(Error::NotSquare { name: inequality.name.clone(), rows, columns });
+    }
+    let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
+    for probe in 0..3 {
+        let x: Vec<f64> = (0..layout.len())
+            .map(|_| {
+                seed ^= seed << 13;
+                seed ^= seed >> 7;
+                seed ^= seed << 17;
+                if probe == 0 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5 }
+            })
+            .collect();
+        let values = layout.matrices(&x);
+        let (mut worst, mut at, mut scale) = (0.0_f64, (0, 0), 0.0_f64);
+        let mut f = (*expression.constant).clone();
+        scale = scale.max(verification::largest_entry(&f));
+        for term in expression.terms.iter() {
+            let value = term.evaluate(&values[term.unknown.index]);
+            scale = scale.max(verification::largest_entry(&value));
+            f += value;
+        }
+        for j in 0..columns {
+            for i in 0..j {
+                let difference = (f[(i, j)] - f[(j, i)]).abs();
+                if difference > worst {
+                    (worst, at) = (difference, (i, j));
+                }
+            }
+        }
+        if worst > 1e-9 * scale {
+            return Err(Error::NotSymmetric {
+                name: inequality.name.clone(),
+                row: at.0,
+                column: at.1,
+                difference: worst,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn lower_block(expression: &Expr, margin: f64, layout: &Layout) -> Block {
+    let n = expression.nrows();
+    let mut constant = vec![0.0; n * n];
+    for j in 0..n {
+        for i in 0..n {
+            constant[i + j * n] = 0.5 * (expression.constant[(i, j)] + expression.constant[(j, i)]);
+        }
+        constant[j + j * n] -= margin;
+    }
+    let mut entries = Vec::new();
+    let mut products = Vec::new();
+    for term in expression.terms.iter() {
+        match &term.shape {
+            Shape::Scaled { weights, matrix } => scaled_entries(term.unknown, weights, matrix, layout, &mut entries),
+            Shape::Product { .. } => products.push(Product::of(term)),
+        }
+    }
+    let stacks = stack(products, layout);
+    if n == 1 {
+        let mut row: Vec<(usize, f64)> = entries.iter().map(|e: &Entry| (e.unknown, e.value)).collect();
+        for stack in &stacks {
+            let k = stack.v.len();
+            for (r, u) in stack.u.iter().enumerate() {
+                for (s, v) in stack.v.iter().enumerate() {
+                    row.push((stack.positions[r * k + s], 2.0 * u[0] * v[0]));
+                }
+            }
+        }
+        return Block::Diagonal(DiagonalBlock::new(constant, vec![row]));
+    }
+    Block::Dense(DenseBlock { size: n, constant, factored: Factored::new(n, stacks), sparse: Sparse::new(n, entries) })
+}
+
+fn scaled_entries(unknown: Unknown, weights: &Mat<f64>, matrix: &Mat<f64>, layout: &Layout, entries: &mut Vec<Entry>) {
+    for i in 0..weights.nrows() {
+        for j in 0..weights.ncols() {
+            let weight = weights[(i, j)];
+            if weight == 0.0 {
+                continue;
+            }
+            for column in 0..matrix.ncols() {
+                for row in column..matrix.nrows() {
+                    let value = 0.5 * weight * (matrix[(row, column)] + matrix[(column, row)]);
+                    if value != 0.0 {
+                        entries.push(Entry { unknown: layout.position(unknown, i, j), row, column, value });
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// `½(U X Vᵀ + V Xᵀ Uᵀ)`.
+#[derive(Clone)]
+struct Product {
+    unknown: Unknown,
+    u: Mat<f64>,
+    v: Mat<f64>,
+}
+
+impl Product {
+    fn of(term: &Term) -> Self {
+        let Shape::Product { left, transposed, right } = &term.shape else {
+            unreachable!("only products are lowered to products");
+        };
+        // U Xᵀ V and its transpose Vᵀ X Uᵀ have the same symmetric part.
+        let (u, v) = if *transposed {
+            (right.transpose().to_owned(), left.clone())
+        } else {
+            (left.clone(), right.transpose().to_owned())
+        };
+        Self { unknown: term.unknown, u, v }.normalized()
+    }
+
+    /// Moves sign and power of two of V's first entry to U, exactly, so that equal factors compare equal.
+    fn normalized(mut self) -> Self {
+        let first = (0..self.v.ncols())
+            .flat_map(|j| (0..self.v.nrows()).map(move |i| (i, j)))
+            .map(|(i, j)| self.v[(i, j)])
+            .find(|&v| v != 0.0);
+        if let Some(first) = first {
+            let scale = 2.0_f64.powi(first.abs().log2().floor().clamp(-900.0, 900.0) as i32).copysign(first);
+            self.u *= faer::Scale(scale);
+            self.v *= faer::Scale(1.0 / scale);
+        }
+        self
+    }
+
+    /// The same term with the factors exchanged, which a symmetric unknown permits.
+    fn flipped(&self) -> Option<Self> {
+        self.unknown
+            .symmetric
+            .then(|| Self { unknown: self.unknown, u: self.v.clone(), v: self.u.clone() }.normalized())
+    }
+
+    /// The term written with the given right factor, when it can be.
+    fn with_right_factor(&self, v: &Mat<f64>) -> Option<Self> {
+        if self.v == *v {
+            return Some(self.clone());
+        }
+        self.flipped().filter(|flipped| flipped.v == *v)
+    }
+}
+
+/// Gathers products into stacks, most frequent right factor first.
+fn stack(products: Vec<Product>, layout: &Layout) -> Vec<Stack> {
+    let mut left = merge_left_factors(products);
+    let mut stacks = Vec::new();
+    while !left.is_empty() {
+        let v = most_frequent_right_factor(&left);
+        let mut merged: Vec<Product> = Vec::new();
+        let mut rest = Vec::new();
+        for product in left {
+            match product.with_right_factor(&v) {
+                None => rest.push(product),
+                Some(product) => match merged.iter_mut().find(|m| m.unknown == product.unknown) {
+                    Some(m) => m.u += &product.u,
+                    None => merged.push(product),
+                },
+            }
+        }
+        left = rest;
+        let columns = nonzero_columns(&v);
+        let mut stack = Stack { u: Vec::new(), v: columns.iter().map(|&j| column(&v, j, 1.0)).collect(), positions: vec![] };
+        for product in &merged {
+            for i in nonzero_columns(&product.u) {
+                stack.u.push(column(&product.u, i, 0.5));
+                stack.positions.extend(columns.iter().map(|&j| layout.position(product.unknown, i, j)));
+            }
+        }
+        if !stack.u.is_empty() && !stack.v.is_empty() {
+            stacks.push(stack);
+        }
+    }
+    stacks
+}
+
+/// `U X V₁ᵀ + U X V₂ᵀ = U X (V₁ + V₂)ᵀ` where that leaves fewer terms than merging equal right factors would.
+fn merge_left_factors(products: Vec<Product>) -> Vec<Product> {
+    let distinct = |unknown: Unknown, pick: fn(&Product) -> &Mat<f64>| {
+        let mut seen: Vec<&Mat<f64>> = Vec::new();
+        for product in products.iter().filter(|p| p.unknown == unknown) {
+            if !seen.contains(&pick(product)) {
+                seen.push(pick(product));
+            }
+        }
+        seen.len()
+    };
+    let prefers_left: Vec<bool> = products
+        .iter()
+        .map(|p| !p.unknown.symmetric && distinct(p.unknown, |p| &p.u) < distinct(p.unknown, |p| &p.v))
+        .collect();
+    let mut merged: Vec<Product> = Vec::new();
+    for (product, prefers_left) in products.into_iter().zip(prefers_left) {
+        let same = |m: &&mut Product| prefers_left && m.unknown == product.unknown && m.u == product.u;
+        match merged.iter_mut().find(same) {
+            Some(m) => m.v += &product.v,
+            None => merged.push(product),
+        }
+    }
+    merged
+}
+
+fn most_frequent_right_factor(products: &[Product]) -> Mat<f64> {
+    let mut counts: Vec<(Mat<f64>, usize)> = Vec::new();
+    for product in products {
+        for candidate in std::iter::once(product.clone()).chain(product.flipped()) {
+            match counts.iter_mut().find(|(v, _)| *v == candidate.v) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((candidate.v, 1)),
+            }
+        }
+    }
+    // The first among equals, so that the outcome does not depend on anything but the expression.
+    let mut best = 0;
+    for (i, (_, count)) in counts.iter().enumerate() {
+        if *count > counts[best].1 {
+            best = i;
+        }
+    }
+    counts.swap_remove(best).0
+}
+
+fn nonzero_columns(m: &Mat<f64>) -> Vec<usize> {
+    (0..m.ncols()).filter(|&j| (0..m.nrows()).any(|i| m[(i, j)] != 0.0)).collect()
+}
+
+fn column(m: &Mat<f64>, j: usize, factor: f64) -> Vec<f64> {
+    (0..m.nrows()).map(|i| factor * m[(i, j)]).collect()
+}

@@ -1,0 +1,63 @@
+//! What a solve may take and how far it has to get.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// Settings of one solve. `Options::default()` is meant to be right for control problems.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Interior-point iterations at most (default 150).
+    pub max_iterations: usize,
+    /// Relative duality gap |p − d| / (1 + |p| + |d|) to aim for (default 1e-9).
+    ///
+    /// When rounding stops the iteration earlier, [`Outcome::Solved`](crate::Outcome::Solved) is still given for a
+    /// gap of at most 1e-7, never for a larger one.
+    pub gap_tolerance: f64,
+    /// Relative residual of the equations of the problem and its dual for
+    /// [`Outcome::Solved`](crate::Outcome::Solved) (default 1e-8).
+    pub feasibility_tolerance: f64,
+    /// Default margin of strict inequalities, relative to the block's scale (default 1e-12).
+    ///
+    /// `F(x) ≻ 0` is posed as `F(x) ⪰ margin · s · I`, where s is the largest absolute entry of the block's
+    /// known part (1 when the known part is zero).
+    pub margin: f64,
+    /// Stops the solve soon after it becomes true, with [`Outcome::Inaccurate`](crate::Outcome::Inaccurate).
+    pub cancel: Option<Arc<AtomicBool>>,
+    /// Stops the solve soon after this time, with [`Outcome::Inaccurate`](crate::Outcome::Inaccurate).
+    pub time_limit: Option<Duration>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            max_iterations: 150,
+            gap_tolerance: 1e-9,
+            feasibility_tolerance: 1e-8,
+            margin: 1e-12,
+            cancel: None,
+            time_limit: None,
+        }
+    }
+}
+
+impl Options {
+    pub(crate) fn check(&self) -> Result<(), crate::Error> {
+        let tolerance = |option, value: f64| {
+            if value > 0.0 && value < 1.0 {
+                return Ok(());
+            }
+            Err(crate::Error::BadOption { option, value, allowed: "a tolerance lies between 0 and 1" })
+        };
+        tolerance("gap_tolerance", self.gap_tolerance)?;
+        tolerance("feasibility_tolerance", self.feasibility_tolerance)?;
+        if !(0.0..1.0).contains(&self.margin) {
+            return Err(crate::Error::BadOption {
+                option: "margin",
+                value: self.margin,
+                allowed: "a relative margin is at least 0 and less than 1",
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,171 @@
+//! Problems: unknowns, inequalities and an objective.
+
+use crate::answer::{Answer, BlockReport};
+use crate::expression::{Expr, Unknown};
+use crate::lowering::{Layout, Lowered, lower};
+use crate::report::{Original, Translation, report};
+use crate::verification::{self, Spectrum};
+use crate::{Error, Mat, Options, interior_point};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// An inequality `F(x) ⪰ margin·I`.
+#[derive(Clone, Debug)]
+pub(crate) struct Inequality {
+    pub name: String,
+    pub expression: Expr,
+    /// `None`: the default margin of the options.
+    pub margin: Option<f64>,
+}
+
+/// The direction of the objective.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sense {
+    Minimize,
+    Maximize,
+}
+
+/// An LMI problem: matrix unknowns, inequalities on affine expressions in them, a linear objective.
+///
+/// See the [crate's front page](crate) for an example. Without an objective the problem is one of feasibility.
+#[derive(Debug)]
+pub struct Problem {
+    id: u64,
+    names: Vec<String>,
+    unknowns: Vec<Unknown>,
+    inequalities: Vec<Inequality>,
+    objective: Option<(Sense, Expr)>,
+}
+
+impl Default for Problem {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Problem {
+    /// A problem without unknowns and inequalities.
+    pub fn new() -> Self {
+        static NEXT: AtomicU64 = AtomicU64::new(0);
+        Self {
+            id: NEXT.fetch_add(1, Ordering::Relaxed),
+            names: Vec::new(),
+            unknowns: Vec::new(),
+            inequalities: Vec::new(),
+            objective: None,
+        }
+    }
+
+    /// A symmetric n × n unknown, n(n + 1)/2 scalars. Symmetric only: definiteness is an inequality of its own.
+    pub fn symmetric(&mut self, name: impl Into<String>, n: usize) -> Expr {
+        self.unknown(name.into(), n, n, true)
+    }
+
+    /// An unknown with `rows` rows and `cols` columns.
+    pub fn rectangular(&mut self, name: impl Into<String>, rows: usize, cols: usize) -> Expr {
+        self.unknown(name.into(), rows, cols, false)
+    }
+
+    /// A scalar unknown, as a 1 × 1 expression.
+    pub fn scalar(&mut self, name: impl Into<String>) -> Expr {
+        self.unknown(name.into(), 1, 1, true)
+    }
+
+    /// Demands `F ≻ 0`, posed as `F ⪰ margin·I` with the default margin of [`Options::margin`].
+    pub fn positive_definite(&mut self, name: impl Into<String>, expression: impl Into<Expr>) {
+        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: None });
+    }
+
+    /// Demands `F ⪰ margin·I`.
+    pub fn positive_definite_by(&mut self, name: impl Into<String>, expression: impl Into<Expr>, margin: f64) {
+        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: Some(margin) });
+    }
+
+    /// Sets the objective: the smallest value of a 1 × 1 expression.
+    pub fn minimize(&mut self, objective: &Expr) {
+        self.objective = Some((Sense::Minimize, objective.clone()));
+    }
+
+    /// Sets the objective: the largest value of a 1 × 1 expression.
+    pub fn maximize(&mut self, objective: &Expr) {
+        self.objective = Some((Sense::Maximize, objective.clone()));
+    }
+
+    /// Names of the unknowns, in the order made.
+    pub fn unknown_names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Number of scalar unknowns.
+    pub fn scalar_unknowns(&self) -> usize {
+        Layout::new(&self.unknowns).len()
+    }
+
+    /// Solves the problem.
+    ///
+    /// # Errors
+    ///
+    /// Only for problems without meaning ([`Error`]): no inequality, data that is not finite, an inequality that is not
+    /// square and symmetric, an objective that is not 1 × 1, an unknown of another problem, an option out of range.
+    /// Infeasible, unbounded and inaccurate are outcomes.
+    pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
+        options.check()?;
+        let lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
+        let result = interior_point::solve(&lowered.program, options);
+        let translation = Translation {
+            layout: &lowered.layout,
+            unknowns: &self.unknowns,
+            objective_constant: lowered.objective_constant,
+            sign: lowered.sign,
+        };
+        Ok(report(&Stated { problem: self, lowered: &lowered }, &translation, result, options))
+    }
+
+    fn unknown(&mut self, name: String, rows: usize, cols: usize, symmetric: bool) -> Expr {
+        let unknown = Unknown { problem: self.id, index: self.unknowns.len(), rows, cols, symmetric };
+        self.names.push(name);
+        self.unknowns.push(unknown);
+        Expr::unknown(unknown)
+    }
+}
+
+/// A problem as its expressions state it.
+struct Stated<'a> {
+    problem: &'a Problem,
+    lowered: &'a Lowered,
+}
+
+impl Original for Stated<'_> {
+    fn blocks(&self) -> Vec<BlockReport> {
+        let reports = self.problem.inequalities.iter().zip(&self.lowered.margins).map(|(inequality, &margin)| BlockReport {
+            name: inequality.name.clone(),
+            size: inequality.expression.nrows(),
+            smallest_eigenvalue: f64::NAN,
+            margin,
+        });
+        reports.collect()
+    }
+
+    fn value(&self, block: usize, values: &[Mat<f64>]) -> Mat<f64> {
+        self.problem.inequalities[block].expression.evaluate(&|unknown| &values[unknown.index])
+    }
+
+    fn objective(&self, values: &[Mat<f64>]) -> f64 {
+        let objective = self.problem.objective.as_ref();
+        objective.map_or(0.0, |(_, expression)| expression.evaluate(&|unknown| &values[unknown.index])[(0, 0)])
+    }
+
+    fn gradient(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
+        let mut gradients: Vec<Mat<f64>> =
+            self.problem.unknowns.iter().map(|unknown| Mat::zeros(unknown.rows, unknown.cols)).collect();
+        for (inequality, z) in self.problem.inequalities.iter().zip(multipliers) {
+            for term in inequality.expression.terms.iter() {
+                gradients[term.unknown.index] += verification::gradient(term, z);
+            }
+        }
+        self.lowered.layout.scalars(&gradients)
+    }
+
+    fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {
+        self.problem.inequalities[block].margin.map(|margin| margin - spectrum.rounding)
+    }
+}

@@ -1,0 +1,124 @@
+//! The Schur complement system `M dx = r`, `M_ij = Σ_b tr(F_{b,i} S_b⁻¹ F_{b,j} Z_b)`: symmetric, positive semidefinite,
+//! definite when the coefficient matrices are linearly independent.
+
+use crate::dense::{Scratch, axpy, cholesky, dot, norm};
+use faer::linalg::cholesky::llt;
+use faer::{Conj, MatMut, MatRef, Par};
+use faer::dyn_stack::{MemBuffer, MemStack};
+
+/// M with its factorisation.
+pub(crate) struct Schur {
+    n: usize,
+    /// The lower triangle of M, column by column.
+    pub matrix: Vec<f64>,
+    factor: Vec<f64>,
+    /// 1/√M_ii: the factorised matrix is scaled to a unit diagonal.
+    scale: Vec<f64>,
+    scratch: Scratch,
+    buffer: MemBuffer,
+    residual: Vec<f64>,
+    correction: Vec<f64>,
+    /// What was added to the unit diagonal to make the factorisation exist.
+    pub regularization: f64,
+}
+
+impl Schur {
+    pub fn new(n: usize) -> Self {
+        Self {
+            n,
+            matrix: vec![0.0; n * n],
+            factor: vec![0.0; n * n],
+            scale: vec![0.0; n],
+            scratch: Scratch::new(n),
+            buffer: MemBuffer::new(llt::solve::solve_in_place_scratch::<f64>(n, 1, Par::Seq)),
+            residual: vec![0.0; n],
+            correction: vec![0.0; n],
+            regularization: 0.0,
+        }
+    }
+
+    /// Factorises M. Unknowns that appear nowhere stay where they are; linearly dependent coefficient matrices
+    /// are met by adding to the diagonal, from rounding level upwards. False when M is not finite.
+    pub fn factorize(&mut self) -> bool {
+        let n = self.n;
+        let largest = (0..n).map(|i| self.matrix[i + i * n]).fold(0.0, f64::max);
+        if !largest.is_finite() {
+            return false;
+        }
+        for i in 0..n {
+            let diagonal = &mut self.matrix[i + i * n];
+            if diagonal.is_nan() {
+                return false;
+            }
+            if *diagonal <= f64::MIN_POSITIVE {
+                *diagonal = 1.0;
+            }
+            self.scale[i] = 1.0 / diagonal.sqrt();
+        }
+        self.regularization = 0.0;
+        loop {
+            for j in 0..n {
+                let scale = self.scale[j];
+                let columns = self.factor[j * n + j..(j + 1) * n].iter_mut().zip(&self.matrix[j * n + j..(j + 1) * n]);
+                for ((factor, entry), other) in columns.zip(&self.scale[j..]) {
+                    *factor = entry * scale * other;
+                }
+                self.factor[j + j * n] = 1.0 + self.regularization;
+            }
+            if cholesky(n, &mut self.factor, &mut self.scratch) {
+                return true;
+            }
+            self.regularization = if self.regularization == 0.0 { 1e-15 } else { self.regularization * 30.0 };
+            if self.regularization > 1e-3 {
+                return false;
+            }
+        }
+    }
+
+    /// Solves M x = r with iterative refinement against M itself.
+    pub fn solve(&mut self, r: &[f64], x: &mut [f64]) {
+        x.fill(0.0);
+        self.residual.copy_from_slice(r);
+        let mut last = norm(r);
+        let target = 1e-14 * last;
+        for round in 0..4 {
+            self.correction.copy_from_slice(&self.residual);
+            self.solve_factored();
+            axpy(1.0, &self.correction, x);
+            self.compute_residual(r, x);
+            let size = norm(&self.residual);
+            if size.is_nan() || (round > 0 && size >= last) {
+                axpy(-1.0, &self.correction, x);
+                break;
+            }
+            last = size;
+            if size <= target {
+                break;
+            }
+        }
+    }
+
+    fn solve_factored(&mut self) {
+        let n = self.n;
+        self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
+        llt::solve::solve_in_place_with_conj(
+            MatRef::from_column_major_slice(&self.factor, n, n),
+            Conj::No,
+            MatMut::from_column_major_slice_mut(&mut self.correction, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.buffer),
+        );
+        self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
+    }
+
+    /// residual = r − M x from the lower triangle.
+    fn compute_residual(&mut self, r: &[f64], x: &[f64]) {
+        let n = self.n;
+        self.residual.copy_from_slice(r);
+        for j in 0..n {
+            let column = &self.matrix[j * n..(j + 1) * n];
+            axpy(-x[j], &column[j..], &mut self.residual[j..]);
+            self.residual[j] -= dot(&column[j + 1..], &x[j + 1..]);
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Problems in the SDPA sparse format, `.dat-s`.
+//!
+//! ```text
+//! minimise cᵀx   subject to   F(x) = Σᵢ xᵢ Fᵢ − F₀ ⪰ 0      (F block diagonal)
+//! maximise ⟨F₀, Z⟩   subject to   ⟨Fᵢ, Z⟩ = cᵢ,  Z ⪰ 0      (its dual)
+//! ```
+//!
+//! A file holds comment lines (starting with `"` or `*`), the number m of unknowns, the number of blocks, their sizes (a negative one
+//! for a diagonal block), the m entries of c, and then lines `i b r s v`: matrix Fᵢ has in block b the entry v at (r, s) and (s, r), all
+//! counted from 1 except i, where 0 is F₀. The characters `, ( ) { }` count as space. Repeated entries add up.
+//!
+//! ```
+//! let text = "2 = m\n1 = blocks\n{2}\n1.0, 1.0\n0 1 1 2 1.0\n1 1 1 1 1.0\n2 1 2 2 1.0\n";
+//! let problem = lmi::sdpa::read(text.as_bytes())?;
+//! // Minimise x₁ + x₂ over [x₁, −1; −1, x₂] ⪰ 0: x₁ = x₂ = 1.
+//! let answer = problem.solve(&lmi::Options::default())?;
+//! assert!((answer.objective - 2.0).abs() < 1e-6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod reader;
+mod writer;
+
+pub use reader::{ReadError, read};
+pub use writer::write;
+
+use crate::answer::{Answer, BlockReport};
+use crate::block::{Block, DenseBlock, DiagonalBlock, Program};
+use crate::expression::Unknown;
+use crate::factored::Factored;
+use crate::lowering::{Layout, check_size};
+use crate::report::{Original, Translation, report};
+use crate::sparse::{Entry, Sparse};
+use crate::verification::Spectrum;
+use crate::{Error, Mat, Options, interior_point};
+
+/// The shape of one block of F(x).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BlockShape {
+    /// A symmetric matrix with this many rows.
+    Symmetric(usize),
+    /// A diagonal matrix with this many rows.
+    Diagonal(usize),
+}
+
+impl BlockShape {
+    /// Rows of the block.
+    pub fn size(self) -> usize {
+        match self {
+            Self::Symmetric(size) | Self::Diagonal(size) => size,
+        }
+    }
+}
+
+/// One entry of a coefficient matrix and its mirror image, counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coefficient {
+    /// `None` for F₀, otherwise the unknown.
+    pub unknown: Option<usize>,
+    /// The block.
+    pub block: usize,
+    /// The row, at most the column.
+    pub row: usize,
+    /// The column.
+    pub column: usize,
+    /// The entry.
+    pub value: f64,
+}
+
+/// A problem `minimise cᵀx subject to Σ xᵢFᵢ − F₀ ⪰ 0`, coefficient by coefficient.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sdp {
+    /// c.
+    pub objective: Vec<f64>,
+    /// The blocks of F(x).
+    pub blocks: Vec<BlockShape>,
+    /// The entries of F₀, F₁, …, in any order; repeated entries add up.
+    pub coefficients: Vec<Coefficient>,
+}
+
+impl Sdp {
+    /// Solves the problem. The blocks of the answer are named `block 1`, `block 2`, …; its one unknown is the column x.
+    ///
+    /// # Errors
+    ///
+    /// No block; an entry outside its block, off the diagonal of a diagonal block or of an unknown that does not exist; data
+    /// that is not finite; an option out of range; too many unknowns.
+    pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
+        options.check()?;
+        self.check()?;
+        let m = self.objective.len();
+        let unknowns = [Unknown { problem: u64::MAX, index: 0, rows: m, cols: 1, symmetric: false }];
+        let layout = Layout::new(&unknowns);
+        let result = interior_point::solve(&self.program(), options);
+        let translation = Translation { layout: &layout, unknowns: &unknowns, objective_constant: 0.0, sign: 1.0 };
+        Ok(report(&Stated { sdp: self, options }, &translation, result, options))
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        if self.blocks.iter().all(|block| block.size() == 0) {
+            return Err(Error::NoConstraint);
+        }
+        check_size(self.objective.len())?;
+        if let Some((row, &value)) = self.objective.iter().enumerate().find(|(_, c)| !c.is_finite()) {
+            return Err(Error::NotFinite { place: "the objective".to_owned(), row, column: 0, value });
+        }
+        for c in &self.coefficients {
+            let shape = self.blocks.get(c.block).copied();
+            let inside = shape.is_some_and(|shape| match shape {
+                BlockShape::Symmetric(n) => c.row < n && c.column < n,
+                BlockShape::Diagonal(n) => c.row < n && c.column == c.row,
+            });
+            if !inside || c.unknown.is_some_and(|unknown| unknown >= self.objective.len()) {
+                return Err(Error::BadCoefficient {
+                    matrix: c.unknown.map_or(0, |unknown| unknown + 1),
+                    block: c.block,
+                    row: c.row,
+                    column: c.column,
+                });
+            }
+            if !c.value.is_finite() {
+                let place = format!("block {} of F{}", c.block + 1, c.unknown.map_or(0, |unknown| unknown + 1));
+                return Err(Error::NotFinite { place, row: c.row, column: c.column, value: c.value });
+            }
+        }
+        Ok(())
+    }
+
+    /// The solver's form, C = −F₀.
+    fn program(&self) -> Program {
+        let mut entries: Vec<Vec<Entry>> = vec![Vec::new(); self.blocks.len()];
+        let mut constants: Vec<Vec<f64>> = Vec::with_capacity(self.blocks.len());
+        for shape in &self.blocks {
+            constants.push(match shape {
+                BlockShape::Symmetric(n) if *n > 1 => vec![0.0; n * n],
+                _ => vec![0.0; shape.size()],
+            });
+        }
+        for c in &self.coefficients {
+            let (row, column) = (c.row.max(c.column), c.row.min(c.column));
+            match c.unknown {
+                Some(unknown) => entries[c.block].push(Entry { unknown, row, column, value: c.value }),
+                None => {
+                    let (n, constant) = (self.blocks[c.block].size(), &mut constants[c.block]);
+                    if constant.len() == n {
+                        constant[row] -= c.value;
+                    } else {
+                        constant[row + column * n] -= c.value;
+                        if row != column {
+                            constant[column + row * n] -= c.value;
+                        }
+                    }
+                }
+            }
+        }
+        let blocks = self.blocks.iter().zip(entries).zip(constants).map(|((shape, entries), constant)| {
+            let size = shape.size();
+            if constant.len() == size {
+                let mut rows = vec![Vec::new(); size];
+                entries.iter().for_each(|e| rows[e.row].push((e.unknown, e.value)));
+                return Block::Diagonal(DiagonalBlock::new(constant, rows));
+            }
+            Block::Dense(DenseBlock { size, constant, factored: Factored::default(), sparse: Sparse::new(size, entries) })
+        });
+        Program { objective: self.objective.clone(), blocks: blocks.collect() }
+    }
+}
+
+/// A problem as its coefficients state it.
+struct Stated<'a> {
+    sdp: &'a Sdp,
+    options: &'a Options,
+}
+
+impl Original for Stated<'_> {
+    fn blocks(&self) -> Vec<BlockReport> {
+        let report = |(index, shape): (usize, &BlockShape)| BlockReport {
+            name: format!("block {}", index + 1),
+            size: shape.size(),
+            smallest_eigenvalue: f64::NAN,
+            margin: 0.0,
+        };
+        self.sdp.blocks.iter().enumerate().map(report).collect()
+    }
+
+    fn value(&self, block: usize, values: &[Mat<f64>]) -> Mat<f64> {
+        let shape = self.sdp.blocks[block];
+        let diagonal = matches!(shape, BlockShape::Diagonal(_));
+        let mut value = Mat::zeros(shape.size(), if diagonal { 1 } else { shape.size() });
+        for c in self.sdp.coefficients.iter().filter(|c| c.block == block) {
+            let term = c.unknown.map_or(-c.value, |unknown| c.value * values[0][(unknown, 0)]);
+            if diagonal {
+                value[(c.row, 0)] += term;
+            } else {
+                value[(c.row, c.column)] += term;
+                if c.row != c.column {
+                    value[(c.column, c.row)] += term;
+                }
+            }
+        }
+        value
+    }
+
+    fn objective(&self, values: &[Mat<f64>]) -> f64 {
+        self.sdp.objective.iter().enumerate().map(|(i, c)| c * values[0][(i, 0)]).sum()
+    }
+
+    fn gradient(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
+        let mut gradient = vec![0.0; self.sdp.objective.len()];
+        for c in &self.sdp.coefficients {
+            if let Some(unknown) = c.unknown {
+                let count = if c.row == c.column { 1.0 } else { 2.0 };
+                gradient[unknown] += count * c.value * multipliers[c.block][(c.row, c.column)];
+            }
+        }
+        gradient
+    }
+
+    fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {
+        let constant = self.sdp.coefficients.iter().filter(|c| c.block == block && c.unknown.is_none());
+        let square: f64 = constant.map(|c| c.value * c.value * if c.row == c.column { 1.0 } else { 2.0 }).sum();
+        Some(-self.options.feasibility_tolerance * (1.0 + square.sqrt()) - spectrum.rounding)
+    }
+}

@@ -1,0 +1,53 @@
+//! `lpv certify`: check a saved design again, from the plant alone.
+
+use crate::designs;
+use crate::failure::Failure;
+use crate::scenario::read_text;
+use clap::Args;
+use lpv::certificate::{Claim, Verdict, check};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments of `lpv certify`.
+#[derive(Args)]
+pub struct CertifyArguments {
+    /// Design file, as `lpv run` and `lpv design` write it
+    design: PathBuf,
+    /// Print the claims as JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Certificate<'a> {
+    design: &'a str,
+    verdict: Verdict,
+    claims: &'a [Claim],
+}
+
+/// Check the design; anything worse than `numerical` is a failure.
+pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
+    let design = designs::from_json(&arguments.design, &read_text(&arguments.design)?)?;
+    let plant = design.plant.build().map_err(|error| Failure::Unreadable {
+        file: arguments.design.clone(),
+        message: error.to_string(),
+    })?;
+    let claims = check(&design, &*plant);
+    let verdict = designs::worst(&claims);
+    if arguments.json {
+        let certificate = Certificate { design: &design.name, verdict, claims: &claims };
+        let json = serde_json::to_string_pretty(&certificate).map_err(|error| Failure::serialisation(&error))?;
+        println!("{json}");
+    } else {
+        println!("{}: {}", design.name, verdict.word());
+        for claim in &claims {
+            println!("  {}: {} ({})", claim.verdict.word(), claim.claim, claim.detail);
+        }
+    }
+    match verdict {
+        Verdict::Proved | Verdict::Numerical => Ok(()),
+        Verdict::Refuted | Verdict::Undecided => {
+            Err(Failure::NotCertified(format!("\"{}\" is {}", design.name, verdict.word())))
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Designs of a scenario: synthesis with progress, checks, JSON files.
+
+use crate::failure::Failure;
+use crate::progress;
+use crate::scenario::Scenario;
+use lpv::certificate::{Claim, Verdict, check};
+use lpv::synthesis::{Design, DesignRequest, SynthesisError, design};
+use serde::Serialize;
+use std::time::Instant;
+
+/// A design with what its check said.
+pub struct CheckedDesign {
+    /// The design.
+    pub design: Design,
+    /// Claims about it that need no flight.
+    pub claims: Vec<Claim>,
+    /// Seconds that synthesis took; zero where a design was shared.
+    pub design_seconds: f64,
+    /// Seconds that the check took.
+    pub check_seconds: f64,
+}
+
+impl CheckedDesign {
+    /// The worst verdict of its claims.
+    pub fn verdict(&self) -> Verdict {
+        worst(&self.claims)
+    }
+
+    /// What `--json` prints of it.
+    pub fn summary(&self) -> DesignSummary<'_> {
+        let points = &self.design.points;
+        DesignSummary {
+            name: &self.design.name,
+            method: self.design.method,
+            convention: &self.design.convention,
+            verdict: self.verdict(),
+            trace_y: points.iter().map(|point| point.trace_y).collect(),
+            parameters: points.iter().map(|point| point.rho).collect(),
+            gain_at_first_parameter: lpv::math::matrix::to_rows(&points[0].gain),
+            iterations: points.iter().map(|point| point.iterations).sum(),
+            seconds: self.design_seconds,
+            claims: &self.claims,
+        }
+    }
+}
+
+/// A design in a few lines, for machines.
+#[derive(Serialize)]
+pub struct DesignSummary<'a> {
+    name: &'a str,
+    #[serde(flatten)]
+    method: lpv::synthesis::Method,
+    convention: &'a str,
+    verdict: Verdict,
+    /// tr Y at each grid point.
+    trace_y: Vec<f64>,
+    /// Parameter value of each grid point.
+    parameters: Vec<f64>,
+    gain_at_first_parameter: Vec<Vec<f64>>,
+    iterations: usize,
+    seconds: f64,
+    claims: &'a [Claim],
+}
+
+/// The worst verdict of some claims; `undecided` for none.
+pub fn worst(claims: &[Claim]) -> Verdict {
+    claims.iter().map(|claim| claim.verdict).min().unwrap_or(Verdict::Undecided)
+}
+
+/// Design and check every controller of the scenario, in its order. Controllers that differ only in how they are flown
+/// share one synthesis.
+pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
+    let mut finished: Vec<(DesignRequest, CheckedDesign)> = Vec::new();
+    for controller in &scenario.controllers {
+        let request = &controller.request;
+        let shared = finished.iter().find(|(earlier, _)| same_but_name(earlier, request)).map(|(_, checked)| checked);
+        let checked = match shared {
+            Some(earlier) => CheckedDesign {
+                design: Design { name: request.name.clone(), ..earlier.design.clone() },
+                claims: earlier.claims.clone(),
+                design_seconds: 0.0,
+                check_seconds: 0.0,
+            },
+            None => design_one(scenario, request)
+                .map_err(|source| Failure::Synthesis { controller: request.name.clone(), source })?,
+        };
+        finished.push((request.clone(), checked));
+    }
+    Ok(finished.into_iter().map(|(_, checked)| checked).collect())
+}
+
+fn same_but_name(a: &DesignRequest, b: &DesignRequest) -> bool {
+    // all requests of a scenario share plant, weights, grid and sample time
+    a.method == b.method && a.schedule == b.schedule && a.limits == b.limits
+}
+
+fn design_one(scenario: &Scenario, request: &DesignRequest) -> Result<CheckedDesign, SynthesisError> {
+    let grid_points = if scenario.plant.description().scheduling.is_some() { request.grid_points } else { 1 };
+    let bar = progress::bar(&format!("design {}", request.name), grid_points);
+    let started = Instant::now();
+    let design = design(&scenario.plant_spec, &*scenario.plant, request, &|done| bar.set_position(done as u64))?;
+    let design_seconds = started.elapsed().as_secs_f64();
+    bar.set_message(format!("check {}", request.name));
+    let started = Instant::now();
+    let claims = check(&design, &*scenario.plant);
+    bar.finish_and_clear();
+    Ok(CheckedDesign { design, claims, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
+}
+
+/// The JSON file of a design.
+pub fn to_json(design: &Design) -> Result<Vec<u8>, Failure> {
+    let mut json = serde_json::to_vec(design).map_err(|error| Failure::serialisation(&error))?;
+    json.push(b'\n');
+    Ok(json)
+}
+
+/// Read a design from `text` of `file`.
+pub fn from_json(file: &std::path::Path, text: &str) -> Result<Design, Failure> {
+    let unreadable = |message: String| Failure::Unreadable { file: file.to_owned(), message };
+    let design: Design = serde_json::from_str(text).map_err(|error| unreadable(format!("is not a design: {error}")))?;
+    design.validate().map_err(|error| unreadable(format!("is not a usable design: {error}")))?;
+    Ok(design)
+}
+
+/// File name of a controller's design.
+pub fn file_name(controller: &str) -> String {
+    format!("design-{controller}.json")
+}

@@ -1,0 +1,60 @@
+//! The program `lpv`: from a nonlinear plant to a checked gain-scheduled controller and its flight.
+//!
+//! Each subcommand is a file; what several share is beside them:
+//! `scenario` reads TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
+//! `table` prints them, `folder` keeps results whole, `failure` is every way to end that is not success.
+
+mod certify;
+mod design;
+mod designs;
+mod failure;
+mod flights;
+mod folder;
+mod progress;
+mod record;
+mod report;
+mod run;
+mod scenario;
+mod simulate;
+mod table;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Gain-scheduled control of nonlinear plants with saturating actuators, with a guarantee that is checked.
+///
+/// Exit codes: 0 done and certified as asked; 2 bad input; 3 infeasible; 4 not certified or undecided; 1 a defect of lpv.
+#[derive(Parser)]
+#[command(version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// The whole job: design, check, fly, report
+    Run(run::RunArguments),
+    /// Design the controllers of a scenario and check them
+    Design(design::DesignArguments),
+    /// Check a saved design again, from the plant alone
+    Certify(certify::CertifyArguments),
+    /// Fly saved designs through a scenario
+    Simulate(simulate::SimulateArguments),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Design(arguments) => design::run(&arguments),
+        Command::Certify(arguments) => certify::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("lpv: {failure}");
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

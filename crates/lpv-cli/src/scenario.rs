@@ -1,0 +1,440 @@
+//! Scenario files: TOML → plain values → ready objects. Everything that can be wrong with a file is met here, with the
+//! file, the key, the value and what is allowed.
+
+mod file;
+mod weights;
+
+use crate::failure::Failure;
+use file::{ControllerTable, ScenarioFile};
+use lpv::controller::InputLimits;
+use lpv::estimator::NoiseCovariance;
+use lpv::math::eigen::unstabilizable_mode;
+use lpv::model::GridModel;
+use lpv::plant::{Description, Plant, PlantSpec};
+use lpv::sim::{Reference, SetPoint};
+use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method};
+use std::path::{Path, PathBuf};
+
+/// A scenario, ready to design and fly.
+pub struct Scenario {
+    /// Name of the result folder.
+    pub name: String,
+    /// Title of the report.
+    pub title: String,
+    /// What it shows.
+    pub description: String,
+    /// The file, as text, for the record.
+    pub text: String,
+    /// The plant as data.
+    pub plant_spec: PlantSpec,
+    /// The plant.
+    pub plant: Box<dyn Plant>,
+    /// Cost weights.
+    pub weights: CostWeights,
+    /// Initial state.
+    pub initial_state: Vec<f64>,
+    /// Set points.
+    pub reference: Reference,
+    /// What each set point is called in the report.
+    pub set_point_labels: Vec<String>,
+    /// End of the flight.
+    pub duration_s: f64,
+    /// Time between samples.
+    pub sample_time_s: f64,
+    /// Integration steps per sample.
+    pub steps_per_sample: usize,
+    /// Time between rows of the trajectory files.
+    pub record_interval_s: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Noise of the runs that have it.
+    pub noise: Option<NoiseCovariance>,
+    /// The controllers, in file order.
+    pub controllers: Vec<ControllerPlan>,
+}
+
+/// A controller to design and fly.
+pub struct ControllerPlan {
+    /// What the report calls it.
+    pub label: String,
+    /// What to design.
+    pub request: DesignRequest,
+    /// Fly with noise.
+    pub noise: bool,
+    /// Feed back the estimate of an extended Kalman filter.
+    pub estimator: bool,
+    /// The verdict that the design has to reach, if any.
+    pub require: Option<lpv::certificate::Verdict>,
+}
+
+/// Where a value stands, for messages.
+struct Door<'a> {
+    file: &'a Path,
+}
+
+impl Door<'_> {
+    fn refuse<T>(&self, key: impl Into<String>, message: impl Into<String>) -> Result<T, Failure> {
+        Err(Failure::BadInput { file: self.file.to_owned(), key: key.into(), message: message.into() })
+    }
+
+    fn positive(&self, key: &str, value: f64) -> Result<f64, Failure> {
+        match value.is_finite() && value > 0.0 {
+            true => Ok(value),
+            false => self.refuse(key, format!("is {value}: it has to be a positive, finite number")),
+        }
+    }
+
+    fn finite(&self, key: &str, value: f64) -> Result<f64, Failure> {
+        match value.is_finite() {
+            true => Ok(value),
+            false => self.refuse(key, format!("is {value}: it has to be finite")),
+        }
+    }
+}
+
+impl Scenario {
+    /// Read and check the scenario at `path`.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let text = read_text(path)?;
+        let door = Door { file: path };
+        let file: ScenarioFile = toml::from_str(&text)
+            .map_err(|error| Failure::Unreadable { file: path.to_owned(), message: error.to_string().trim_end().into() })?;
+
+        file_name_part(&door, "name", &file.name)?;
+        let plant_spec = file::plant(&door, file.plant)?;
+        let plant = match plant_spec.build() {
+            Ok(plant) => plant,
+            Err(error) => return door.refuse("plant", error.to_string()),
+        };
+        let description = plant.description();
+        let (n, m) = (description.states.len(), description.inputs.len());
+
+        let weights = CostWeights {
+            q: weights::definite(&door, "weights.Q", file.weights.q, file.weights.q_diag, n)?,
+            r: weights::definite(&door, "weights.R", file.weights.r, file.weights.r_diag, m)?,
+        };
+        let grid_points = grid_points(&door, file.model.grid_points, &*plant)?;
+        stabilizable(&door, &GridModel::of_plant(&*plant, grid_points))?;
+
+        let simulation = file.simulation;
+        let duration_s = door.positive("simulation.duration_s", simulation.duration_s)?;
+        let sample_time_s = door.positive("simulation.sample_time_s", simulation.sample_time_s)?;
+        if duration_s / sample_time_s > 1e7 {
+            return door.refuse("simulation.duration_s", "the flight has more than 10 million samples; fly shorter or sample slower");
+        }
+        if !(1..=1000).contains(&simulation.steps_per_sample) {
+            let message = format!("is {}: allowed are 1 to 1000", simulation.steps_per_sample);
+            return door.refuse("simulation.steps_per_sample", message);
+        }
+        let record_interval_s = match simulation.record_interval_s {
+            Some(interval) if interval < sample_time_s => {
+                return door.refuse("simulation.record_interval_s", format!("is {interval}: it cannot be less than sample_time_s = {sample_time_s}"));
+            }
+            Some(interval) => door.finite("simulation.record_interval_s", interval)?,
+            None => (10.0 * sample_time_s).min(duration_s),
+        };
+        let trim = plant.trim(0.0);
+        let mut initial_state = trim.state.clone();
+        for (key, value) in &simulation.initial_state {
+            let (state, value) = state_value(&door, &format!("simulation.initial_state.{key}"), description, key, value)?;
+            initial_state[state] = value;
+        }
+        let mut set_points = Vec::new();
+        for (k, table) in file.set_point.iter().enumerate() {
+            set_points.push(set_point(&door, &format!("set_point[{}]", k + 1), description, table, duration_s)?);
+        }
+        set_points.sort_by(|a: &(SetPoint, String), b| a.0.time_s.total_cmp(&b.0.time_s));
+        if let Some(pair) = set_points.windows(2).find(|pair| pair[0].0.time_s == pair[1].0.time_s) {
+            return door.refuse("set_point", format!("two set points have time_s = {}; join them", pair[0].0.time_s));
+        }
+        let (set_points, set_point_labels) = set_points.into_iter().unzip();
+        let reference = Reference::new(initial_state.clone(), set_points);
+
+        let noise = match file.noise {
+            None => None,
+            Some(noise) => Some(NoiseCovariance {
+                process: weights::semidefinite(
+                    &door, "noise.process", noise.process, noise.process_diag, description.disturbances.len(),
+                )?,
+                measurement: weights::definite(
+                    &door, "noise.measurement", noise.measurement, noise.measurement_diag, description.outputs.len(),
+                )?,
+            }),
+        };
+
+        let defaults = RequestDefaults { weights: &weights, grid_points, sample_time_s, limits: file.limits.as_ref(), description, operating_input: &trim.input };
+        let mut controllers: Vec<ControllerPlan> = Vec::new();
+        if file.controller.is_empty() {
+            return door.refuse("controller", "there is none; add at least one [[controller]] table");
+        }
+        for (k, table) in file.controller.into_iter().enumerate() {
+            let key = format!("controller[{}]", k + 1);
+            let plan = controller(&door, &key, table, &defaults, noise.is_some())?;
+            if controllers.iter().any(|other| other.request.name == plan.request.name) {
+                return door.refuse(format!("{key}.name"), format!("\"{}\" is already taken; names have to differ", plan.request.name));
+            }
+            controllers.push(plan);
+        }
+        Ok(Self {
+            title: file.title.unwrap_or_else(|| file.name.clone()),
+            name: file.name,
+            description: file.description,
+            text,
+            plant_spec,
+            weights,
+            initial_state,
+            reference,
+            set_point_labels,
+            duration_s,
+            sample_time_s,
+            steps_per_sample: simulation.steps_per_sample,
+            record_interval_s,
+            seed: simulation.seed,
+            noise,
+            controllers,
+            plant,
+        })
+    }
+
+    /// The folder for results: `chosen`, or `out/<name>`.
+    pub fn result_folder(&self, chosen: Option<&Path>) -> PathBuf {
+        chosen.map_or_else(|| Path::new("out").join(&self.name), Path::to_owned)
+    }
+
+    /// The folder of `lpv design`: `out/<name>-designs`.
+    pub fn designs_folder(&self) -> PathBuf {
+        Path::new("out").join(format!("{}-designs", self.name))
+    }
+
+    /// The folder of `lpv simulate`: `out/<name>-flights`.
+    pub fn flights_folder(&self) -> PathBuf {
+        Path::new("out").join(format!("{}-flights", self.name))
+    }
+}
+
+/// The text of a file; a file that is not there is bad input.
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path)
+        .map_err(|error| Failure::Unreadable { file: path.to_owned(), message: format!("cannot be read: {error}") })
+}
+
+/// A name that becomes part of a file name.
+fn file_name_part(door: &Door, key: &str, name: &str) -> Result<(), Failure> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    match !name.is_empty() && name.chars().all(allowed) {
+        true => Ok(()),
+        false => door.refuse(key, format!("\"{name}\": allowed are letters, digits, - and _ (it becomes a file name)")),
+    }
+}
+
+fn grid_points(door: &Door, count: usize, plant: &dyn Plant) -> Result<usize, Failure> {
+    match plant.description().scheduling {
+        Some(_) if !(4..=4096).contains(&count) => {
+            door.refuse("model.grid_points", format!("is {count}: allowed are 4 to 4096"))
+        }
+        _ => Ok(count),
+    }
+}
+
+fn stabilizable(door: &Door, model: &GridModel) -> Result<(), Failure> {
+    for point in &model.points {
+        if let Some((re, im)) = unstabilizable_mode(&point.a, &point.b) {
+            let parameter = model.scheduling.as_ref().map_or(String::new(), |s| format!(" at {} = {:.4}", s.parameter, point.rho));
+            let message = format!(
+                "the pair (A, B) is not stabilisable{parameter}: no input moves the mode {re:.4} {im:+.4}i, which does not decay by itself"
+            );
+            return door.refuse("plant", message);
+        }
+    }
+    Ok(())
+}
+
+/// `name = value` or `name_deg = value` for a state of the plant.
+fn state_value(
+    door: &Door,
+    key: &str,
+    description: &Description,
+    name: &str,
+    value: &toml::Value,
+) -> Result<(usize, f64), Failure> {
+    let number = match value {
+        toml::Value::Float(value) => *value,
+        toml::Value::Integer(value) => *value as f64,
+        other => return door.refuse(key, format!("is a {}: it has to be a number", other.type_str())),
+    };
+    let number = door.finite(key, number)?;
+    let in_degrees = name.strip_suffix("_deg").and_then(|name| description.state(name));
+    match (description.state(name), in_degrees) {
+        (Some(state), _) => Ok((state, number)),
+        (None, Some(state)) if description.states[state].unit == "rad" => Ok((state, number.to_radians())),
+        _ => {
+            let names: Vec<String> = (description.states.iter())
+                .map(|signal| match signal.unit.as_str() {
+                    "rad" => format!("{0}, {0}_deg", signal.name),
+                    _ => signal.name.clone(),
+                })
+                .collect();
+            door.refuse(key, format!("is not a state of the plant; allowed are {}", names.join(", ")))
+        }
+    }
+}
+
+fn set_point(
+    door: &Door,
+    key: &str,
+    description: &Description,
+    table: &toml::Table,
+    duration_s: f64,
+) -> Result<(SetPoint, String), Failure> {
+    let (mut time_s, mut label, mut targets) = (None, None, Vec::new());
+    for (name, value) in table {
+        let key = format!("{key}.{name}");
+        match (name.as_str(), value) {
+            ("time_s", toml::Value::Float(time)) => time_s = Some(*time),
+            ("time_s", toml::Value::Integer(time)) => time_s = Some(*time as f64),
+            ("label", toml::Value::String(text)) => label = Some(text.clone()),
+            ("time_s" | "label", other) => {
+                let expected = if name == "label" { "a string" } else { "a number of seconds" };
+                return door.refuse(key, format!("is a {}: it has to be {expected}", other.type_str()));
+            }
+            _ => targets.push(state_value(door, &key, description, name, value)?),
+        }
+    }
+    let Some(time_s) = time_s else {
+        return door.refuse(format!("{key}.time_s"), "is missing: say when the set point takes effect, in seconds");
+    };
+    if !(0.0..duration_s).contains(&time_s) {
+        return door.refuse(
+            format!("{key}.time_s"),
+            format!("is {time_s}: it has to lie in the flight, from 0 to below {duration_s} s"),
+        );
+    }
+    if targets.is_empty() {
+        return door.refuse(key, "moves no state; give at least one, such as r_x = 1.0");
+    }
+    let spell = |&(state, value): &(usize, f64)| {
+        let signal = &description.states[state];
+        match signal.unit.as_str() {
+            "rad" => format!("{} = {}°", signal.name, (value.to_degrees() * 1e6).round() / 1e6),
+            unit => format!("{} = {value} {unit}", signal.name),
+        }
+    };
+    let label = label.unwrap_or_else(|| targets.iter().map(spell).collect::<Vec<_>>().join(", "));
+    Ok((SetPoint { time_s, targets }, label))
+}
+
+/// What every controller of a scenario shares.
+struct RequestDefaults<'a> {
+    weights: &'a CostWeights,
+    grid_points: usize,
+    sample_time_s: f64,
+    limits: Option<&'a file::LimitsTable>,
+    description: &'a Description,
+    operating_input: &'a [f64],
+}
+
+fn controller(
+    door: &Door,
+    key: &str,
+    table: ControllerTable,
+    defaults: &RequestDefaults,
+    has_noise: bool,
+) -> Result<ControllerPlan, Failure> {
+    file_name_part(door, &format!("{key}.name"), &table.name)?;
+    let limits = match (table.unlimited, table.limits.as_ref().or(defaults.limits)) {
+        (true, _) | (false, None) => InputLimits::none(defaults.operating_input.len()),
+        (false, Some(limits)) => {
+            let place = if table.limits.is_some() { format!("{key}.limits") } else { "limits".into() };
+            input_limits(door, &place, limits, defaults)?
+        }
+    };
+    let gamma = match table.gamma {
+        Some(gamma) => Some(door.positive(&format!("{key}.gamma"), gamma)?),
+        None => None,
+    };
+    let method = match (table.method, gamma) {
+        (file::MethodName::Lpvqr, None) => Method::Lpvqr,
+        (file::MethodName::Lpvqr, Some(_)) => {
+            return door.refuse(format!("{key}.gamma"), "method \"lpvqr\" knows no γ; remove it, or choose \"slpvqr\" or \"high-gain-slpvqr\"");
+        }
+        (_, None) => return door.refuse(format!("{key}.gamma"), "is missing: the saturated methods need the level γ > 0 of their certified set"),
+        (file::MethodName::Slpvqr, Some(gamma)) => Method::Slpvqr { gamma },
+        (file::MethodName::HighGainSlpvqr, Some(gamma)) => {
+            let high_gain = table.high_gain.unwrap_or_default();
+            check_high_gain(door, &format!("{key}.high_gain"), &high_gain)?;
+            Method::HighGainSlpvqr { gamma, high_gain }
+        }
+    };
+    if table.high_gain.is_some() && !matches!(method, Method::HighGainSlpvqr { .. }) {
+        return door.refuse(format!("{key}.high_gain"), "belongs to method \"high-gain-slpvqr\" only");
+    }
+    if method.gamma().is_some() && limits.symmetric_bound(defaults.operating_input).is_none() {
+        return door.refuse(format!("{key}.limits"), "a saturated method needs a limit on every input; give [limits] min and max");
+    }
+    if (table.noise || table.estimator.is_some()) && !has_noise {
+        return door.refuse(format!("{key}.noise"), "the scenario has no [noise] table to take covariances from");
+    }
+    if table.estimator.is_some() && !table.noise {
+        return door.refuse(format!("{key}.estimator"), "an estimator needs measurements: set noise = true");
+    }
+    Ok(ControllerPlan {
+        label: table.label.unwrap_or_else(|| table.name.clone()),
+        request: DesignRequest {
+            name: table.name,
+            method,
+            weights: defaults.weights.clone(),
+            grid_points: defaults.grid_points,
+            schedule: table.schedule,
+            limits,
+            sample_time_s: defaults.sample_time_s,
+        },
+        noise: table.noise,
+        estimator: table.estimator.is_some(),
+        require: table.require,
+    })
+}
+
+fn check_high_gain(door: &Door, key: &str, options: &HighGainOptions) -> Result<(), Failure> {
+    if !(options.recovery >= 0.0 && options.recovery.is_finite()) {
+        return door.refuse(format!("{key}.recovery"), format!("is {}: it has to be a fraction, zero or more", options.recovery));
+    }
+    if !(options.gain_margin >= 1.0 && options.gain_margin.is_finite()) {
+        return door.refuse(format!("{key}.gain_margin"), format!("is {}: it has to be a factor of at least 1", options.gain_margin));
+    }
+    Ok(())
+}
+
+fn input_limits(
+    door: &Door,
+    key: &str,
+    table: &file::LimitsTable,
+    defaults: &RequestDefaults,
+) -> Result<InputLimits, Failure> {
+    let m = defaults.operating_input.len();
+    let spread = |side: &str, bound: &Option<file::Bound>| match bound {
+        None => Ok(vec![None; m]),
+        Some(file::Bound::All(value)) => Ok(vec![Some(*value); m]),
+        Some(file::Bound::Each(values)) if values.len() == m => Ok(values.iter().copied().map(Some).collect()),
+        Some(file::Bound::Each(values)) => {
+            door.refuse(format!("{key}.{side}"), format!("has {} numbers: the plant has {m} inputs", values.len()))
+        }
+    };
+    let limits = InputLimits { min: spread("min", &table.min)?, max: spread("max", &table.max)? };
+    for (i, (&operating, signal)) in defaults.operating_input.iter().zip(&defaults.description.inputs).enumerate() {
+        let outside = |side: &str, bound: f64| {
+            door.refuse(
+                format!("{key}.{side}"),
+                format!(
+                    "is {bound} for {}: the limits exclude the operating input {operating} {}, at which the plant rests; it has to lie strictly between min and max",
+                    signal.name, signal.unit
+                ),
+            )
+        };
+        match (limits.min[i], limits.max[i]) {
+            (Some(min), _) if min.is_nan() || min >= operating => return outside("min", min),
+            (_, Some(max)) if max.is_nan() || max <= operating => return outside("max", max),
+            _ => {}
+        }
+    }
+    Ok(limits)
+}

@@ -1,0 +1,157 @@
+//! The TOML tables of a scenario, as they stand in the file.
+
+use super::Door;
+use crate::failure::Failure;
+use lpv::certificate::Verdict;
+use lpv::plant::{LinearParameters, PlantSpec, QuadrotorParameters};
+use lpv::synthesis::{HighGainOptions, ScheduleKind};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScenarioFile {
+    pub name: String,
+    pub title: Option<String>,
+    #[serde(default)]
+    pub description: String,
+    pub plant: toml::Table,
+    #[serde(default)]
+    pub model: ModelTable,
+    pub weights: WeightsTable,
+    pub limits: Option<LimitsTable>,
+    pub simulation: SimulationTable,
+    pub noise: Option<NoiseTable>,
+    #[serde(default)]
+    pub set_point: Vec<toml::Table>,
+    #[serde(default)]
+    pub controller: Vec<ControllerTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelTable {
+    /// Grid of the scheduling parameter.
+    pub grid_points: usize,
+}
+
+impl Default for ModelTable {
+    fn default() -> Self {
+        Self { grid_points: 32 }
+    }
+}
+
+/// A square matrix: in full, or its diagonal.
+pub type Rows = Option<Vec<Vec<f64>>>;
+pub type Diagonal = Option<Vec<f64>>;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WeightsTable {
+    #[serde(rename = "Q")]
+    pub q: Rows,
+    #[serde(rename = "Q_diag")]
+    pub q_diag: Diagonal,
+    #[serde(rename = "R")]
+    pub r: Rows,
+    #[serde(rename = "R_diag")]
+    pub r_diag: Diagonal,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseTable {
+    pub process: Rows,
+    pub process_diag: Diagonal,
+    pub measurement: Rows,
+    pub measurement_diag: Diagonal,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a number for all inputs, or a list with one for each")]
+pub enum Bound {
+    All(f64),
+    Each(Vec<f64>),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsTable {
+    pub min: Option<Bound>,
+    pub max: Option<Bound>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationTable {
+    pub duration_s: f64,
+    pub sample_time_s: f64,
+    #[serde(default = "one")]
+    pub steps_per_sample: usize,
+    pub record_interval_s: Option<f64>,
+    #[serde(default)]
+    pub seed: u64,
+    #[serde(default)]
+    pub initial_state: toml::Table,
+}
+
+fn one() -> usize {
+    1
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MethodName {
+    Lpvqr,
+    Slpvqr,
+    HighGainSlpvqr,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorName {
+    Ekf,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControllerTable {
+    pub name: String,
+    pub label: Option<String>,
+    pub method: MethodName,
+    pub gamma: Option<f64>,
+    pub high_gain: Option<HighGainOptions>,
+    #[serde(default)]
+    pub schedule: ScheduleKind,
+    pub limits: Option<LimitsTable>,
+    #[serde(default)]
+    pub unlimited: bool,
+    #[serde(default)]
+    pub noise: bool,
+    pub estimator: Option<EstimatorName>,
+    pub require: Option<Verdict>,
+}
+
+/// The plant of the `[plant]` table: its `name`, the rest are its parameters.
+pub(super) fn plant(door: &Door, mut table: toml::Table) -> Result<PlantSpec, Failure> {
+    const NAMES: &str = "\"quadrotor\", \"pendulum\", \"double-integrator\", \"linear\"";
+    let name = match table.remove("name") {
+        Some(toml::Value::String(name)) => name,
+        Some(other) => return door.refuse("plant.name", format!("is a {}: allowed are {NAMES}", other.type_str())),
+        None => return door.refuse("plant.name", format!("is missing: allowed are {NAMES}")),
+    };
+    match name.as_str() {
+        "quadrotor" => Ok(PlantSpec::Quadrotor(parameters::<QuadrotorParameters>(door, table)?)),
+        "linear" => Ok(PlantSpec::Linear(parameters::<LinearParameters>(door, table)?)),
+        "pendulum" | "double-integrator" => match table.keys().next() {
+            Some(key) => door.refuse(format!("plant.{key}"), format!("plant \"{name}\" has no parameters; remove it")),
+            None if name == "pendulum" => Ok(PlantSpec::Pendulum {}),
+            None => Ok(PlantSpec::DoubleIntegrator {}),
+        },
+        _ => door.refuse("plant.name", format!("\"{name}\" is not a plant: allowed are {NAMES}")),
+    }
+}
+
+fn parameters<T: DeserializeOwned>(door: &Door, table: toml::Table) -> Result<T, Failure> {
+    table.try_into().or_else(|error: toml::de::Error| door.refuse("plant", error.to_string().trim_end()))
+}

@@ -1,0 +1,108 @@
+//! `lpv simulate`: the closed loop alone, with designs from files.
+
+use crate::designs;
+use crate::failure::Failure;
+use crate::flights::{self, Flown};
+use crate::folder::ResultFolder;
+use crate::record::{trajectory_csv, trajectory_file_name};
+use crate::scenario::{Scenario, read_text};
+use clap::Args;
+use lpv::certificate::Claim;
+use lpv::estimator::Consistency;
+use lpv::sim::{Outcome, Performance};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments of `lpv simulate`.
+#[derive(Args)]
+pub struct SimulateArguments {
+    /// Scenario file
+    scenario: PathBuf,
+    /// Folder that holds design-<name>.json for each controller [default: where `lpv design` or else `lpv run` wrote them]
+    #[arg(long)]
+    designs: Option<PathBuf>,
+    /// Folder for the trajectories [default: out/<name of the scenario>-flights]
+    #[arg(long, short)]
+    out: Option<PathBuf>,
+    /// Replace earlier trajectories
+    #[arg(long)]
+    force: bool,
+    /// Print the results as JSON instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct FlightSummary<'a> {
+    name: &'a str,
+    outcome: &'a Outcome,
+    #[serde(flatten)]
+    performance: &'a Performance,
+    guaranteed_cost: Option<f64>,
+    claims: &'a [Claim],
+    estimator_consistency: Option<&'a Consistency>,
+    seconds: f64,
+}
+
+/// Fly every controller of the scenario with its saved design.
+pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
+    let scenario = Scenario::read(&arguments.scenario)?;
+    let source = arguments.designs.clone().unwrap_or_else(|| {
+        let designed = scenario.designs_folder();
+        if designed.exists() { designed } else { scenario.result_folder(None) }
+    });
+    let mut loaded = Vec::new();
+    for plan in &scenario.controllers {
+        let file = source.join(designs::file_name(&plan.request.name));
+        let design = designs::from_json(&file, &read_text(&file)?)?;
+        let mismatch = |key: &str| Failure::BadInput {
+            file: file.clone(),
+            key: key.into(),
+            message: format!("differs from {}; design again", arguments.scenario.display()),
+        };
+        if design.plant != scenario.plant_spec {
+            return Err(mismatch("plant"));
+        }
+        if design.sample_time_s != scenario.sample_time_s {
+            return Err(mismatch("sample_time_s"));
+        }
+        loaded.push(design);
+    }
+    let place = arguments.out.clone().unwrap_or_else(|| scenario.flights_folder());
+    let folder = ResultFolder::begin(&place, arguments.force)?;
+    let flown = flights::fly_all(&scenario, &loaded)?;
+    for (plan, flown) in scenario.controllers.iter().zip(&flown) {
+        folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
+    }
+    let place = folder.finish()?;
+    if arguments.json {
+        let summaries: Vec<FlightSummary> =
+            scenario.controllers.iter().zip(&flown).map(|(plan, flown)| summary(&plan.request.name, flown)).collect();
+        let json = serde_json::to_string_pretty(&summaries).map_err(|error| Failure::serialisation(&error))?;
+        println!("{json}");
+    } else {
+        for (plan, flown) in scenario.controllers.iter().zip(&flown) {
+            let cost = flown.performance.actual_cost.map_or("-".into(), |cost| format!("{cost:.4}"));
+            let settling = flown.performance.settling_time_s.map_or("-".into(), |time| format!("{time:.2} s"));
+            let ending = match flown.flight.outcome {
+                Outcome::Completed => "completed".into(),
+                Outcome::Diverged { time_s, .. } => format!("diverged at {time_s:.2} s"),
+            };
+            println!("{}: {ending}, cost {cost}, settling {settling}", plan.label);
+        }
+        println!("{}", place.display());
+    }
+    Ok(())
+}
+
+fn summary<'a>(name: &'a str, flown: &'a Flown) -> FlightSummary<'a> {
+    FlightSummary {
+        name,
+        outcome: &flown.flight.outcome,
+        performance: &flown.performance,
+        guaranteed_cost: flown.guaranteed_cost(),
+        claims: &flown.claims,
+        estimator_consistency: flown.flight.consistency.as_ref(),
+        seconds: flown.seconds,
+    }
+}

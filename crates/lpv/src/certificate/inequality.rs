@@ -1,0 +1,94 @@
+//! The matrix inequalities of a design, block by block, from K, F and P.
+
+use crate::math::Mat;
+use crate::math::eigen::smallest_eigenvalue;
+use crate::math::matrix::{inverse_spd, symmetric_part};
+use crate::model::FrozenModel;
+use crate::synthesis::{Design, FrozenDesign};
+use serde::Serialize;
+
+/// λ_min of one block.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BlockMargin {
+    /// Which inequality.
+    pub name: String,
+    /// Its smallest eigenvalue, NaN when P is not positive definite.
+    pub smallest_eigenvalue: f64,
+}
+
+/// λ_min of every block of the inequalities at one grid point of a design: (4.36) for LPVQR; (5.18), (5.19) for SLPVQR;
+/// (5.20) for all 2^m mixtures and (5.21) for high gain.
+///
+/// The blocks are in Y = P⁻¹ and L = KY, as printed. `model` is the linearisation at the point's parameter.
+pub fn block_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> Vec<BlockMargin> {
+    let mut margins = vec![BlockMargin { name: "P".into(), smallest_eigenvalue: smallest_eigenvalue(&point.p) }];
+    let inverses = (inverse_spd(&point.p), inverse_spd(&design.weights.q), inverse_spd(&design.weights.r));
+    let (Some(y), Some(q_inverse), Some(r_inverse)) = inverses else {
+        margins.push(BlockMargin { name: "P, Q, R invertible".into(), smallest_eigenvalue: f64::NAN });
+        return margins;
+    };
+    let performance = |gain: &Mat<f64>| performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
+
+    match &point.auxiliary_gain {
+        None => margins.push(BlockMargin {
+            name: "performance".into(),
+            smallest_eigenvalue: smallest_eigenvalue(&performance(&point.gain)),
+        }),
+        Some(auxiliary) => {
+            let inputs = point.gain.nrows();
+            margins.extend((0..1usize << inputs).map(|vertex| {
+                let mixture = Mat::from_fn(inputs, point.gain.ncols(), |i, j| {
+                    if vertex >> i & 1 == 1 { point.gain[(i, j)] } else { auxiliary[(i, j)] }
+                });
+                BlockMargin {
+                    name: format!("performance of mixture {vertex:0inputs$b}"),
+                    smallest_eigenvalue: smallest_eigenvalue(&performance(&mixture)),
+                }
+            }));
+        }
+    }
+    let limits = &design.controller.limits;
+    if let (Some(gamma), Some(sigma)) =
+        (design.method.gamma(), limits.symmetric_bound(&design.controller.operating_input))
+    {
+        let unsaturated = point.auxiliary_gain.as_ref().unwrap_or(&point.gain) * &y;
+        margins.extend(sigma.iter().enumerate().map(|(i, bound)| BlockMargin {
+            name: format!("input {} unsaturated", i + 1),
+            smallest_eigenvalue: smallest_eigenvalue(&unsaturated_block(&y, &unsaturated, i, bound * bound / gamma)),
+        }));
+    }
+    margins
+}
+
+/// (2.33)
+fn performance_block(
+    model: &FrozenModel,
+    y: &Mat<f64>,
+    l: &Mat<f64>,
+    q_inverse: &Mat<f64>,
+    r_inverse: &Mat<f64>,
+) -> Mat<f64> {
+    let (n, m) = (y.nrows(), l.nrows());
+    let flow = &model.a * y - &model.b * l;
+    let flow = symmetric_part(&flow);
+    Mat::from_fn(2 * n + m, 2 * n + m, |i, j| match (i / n, j / n) {
+        (0, 0) => -2.0 * flow[(i, j)],
+        (0, 1) => y[(i, j - n)],
+        (1, 0) => y[(i - n, j)],
+        (1, 1) => q_inverse[(i - n, j - n)],
+        (0, _) => l[(j - 2 * n, i)],
+        (_, 0) => l[(i - 2 * n, j)],
+        (1, _) | (_, 1) => 0.0,
+        _ => r_inverse[(i - 2 * n, j - 2 * n)],
+    })
+}
+
+/// (5.19), row `i` of `l`.
+fn unsaturated_block(y: &Mat<f64>, l: &Mat<f64>, row: usize, bound: f64) -> Mat<f64> {
+    Mat::from_fn(1 + y.nrows(), 1 + y.nrows(), |i, j| match (i, j) {
+        (0, 0) => bound,
+        (0, j) => l[(row, j - 1)],
+        (i, 0) => l[(row, i - 1)],
+        (i, j) => y[(i - 1, j - 1)],
+    })
+}

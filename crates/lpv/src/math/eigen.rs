@@ -1,0 +1,76 @@
+//! Eigenvalues: of symmetric matrices, of pencils of definite ones, and of general real matrices.
+
+use super::Mat;
+use faer::{Side, c64};
+
+/// The eigenvalues of a symmetric matrix in ascending order (the lower triangle is read).
+/// A matrix with a non-finite entry has none: the result holds NaN.
+pub fn symmetric_eigenvalues(matrix: &Mat<f64>) -> Vec<f64> {
+    matrix.self_adjoint_eigenvalues(Side::Lower).unwrap_or_else(|_| vec![f64::NAN; matrix.nrows()])
+}
+
+/// λ_min of a symmetric matrix.
+pub fn smallest_eigenvalue(matrix: &Mat<f64>) -> f64 {
+    symmetric_eigenvalues(matrix).first().copied().unwrap_or(f64::NAN)
+}
+
+/// The eigenvalues (re, im) of a real square matrix, in no particular order.
+pub fn eigenvalues(matrix: &Mat<f64>) -> Vec<(f64, f64)> {
+    match matrix.eigenvalues() {
+        Ok(values) => values.into_iter().map(|value: c64| (value.re, value.im)).collect(),
+        Err(_) => vec![(f64::NAN, f64::NAN); matrix.nrows()],
+    }
+}
+
+/// max Re λ(M): negative exactly when ẋ = Mx is asymptotically stable.
+pub fn spectral_abscissa(matrix: &Mat<f64>) -> f64 {
+    eigenvalues(matrix).into_iter().map(|(re, _)| re).fold(f64::NEG_INFINITY, nan_max)
+}
+
+/// max |λ(M)|: below one exactly when x₊ = Mx is asymptotically stable.
+pub fn spectral_radius(matrix: &Mat<f64>) -> f64 {
+    eigenvalues(matrix).into_iter().map(|(re, im)| re.hypot(im)).fold(0.0, nan_max)
+}
+
+/// The larger of two numbers, NaN if either is: an eigenvalue that could not be computed must not pass for stable.
+fn nan_max(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// The first eigenvalue λ of A with Re λ ≥ 0 that the input cannot move: rank [A − λI, B] < n
+/// (Popov–Belevitch–Hautus). `None` when (A, B) is stabilisable.
+pub fn unstabilizable_mode(a: &Mat<f64>, b: &Mat<f64>) -> Option<(f64, f64)> {
+    let (n, m) = (a.nrows(), b.ncols());
+    let scale = a.norm_l2().max(b.norm_l2()).max(f64::MIN_POSITIVE);
+    eigenvalues(a).into_iter().find(|&(re, im)| {
+        // eigenvalues of a defective matrix are exact only to the root of the rounding unit
+        let pencil = Mat::from_fn(n, n + m, |i, j| {
+            let entry = if j < n { a[(i, j)] } else { b[(i, j - n)] };
+            if i == j { c64::new(entry - re, -im) } else { c64::new(entry, 0.0) }
+        });
+        re >= -1e-9 * scale
+            && pencil.singular_values().map_or(true, |values| values.last().is_none_or(|&least| least <= 1e-10 * scale))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::matrix::{diagonal, from_rows};
+
+    #[test]
+    fn a_mode_without_input_is_named() {
+        let a = diagonal(&[-1.0, 2.0]);
+        let b = from_rows(&[vec![1.0], vec![0.0]]);
+        assert_eq!(unstabilizable_mode(&a, &b), Some((2.0, 0.0)));
+        let b = from_rows(&[vec![0.0], vec![1.0]]);
+        assert_eq!(unstabilizable_mode(&a, &b), None, "the uncontrolled mode is stable");
+    }
+
+    #[test]
+    fn rotation_has_imaginary_eigenvalues() {
+        let a = from_rows(&[vec![0.0, 2.0], vec![-2.0, 0.0]]);
+        assert!(spectral_abscissa(&a).abs() < 1e-14);
+        assert!((spectral_radius(&a) - 2.0).abs() < 1e-14);
+    }
+}

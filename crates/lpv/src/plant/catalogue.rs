@@ -1,0 +1,73 @@
+//! The plants that a file can name, each with its parameters.
+
+use super::quadrotor::QuadrotorParameters;
+use super::linear::{Linear, LinearParameters};
+use super::{DoubleIntegrator, Pendulum, Plant, Quadrotor};
+use serde::{Deserialize, Serialize};
+
+/// A plant by name, with its parameters: plain data that a design carries so that it can be checked again later.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "name", rename_all = "kebab-case")]
+pub enum PlantSpec {
+    /// [`Quadrotor`]
+    Quadrotor(QuadrotorParameters),
+    /// [`Pendulum`]
+    Pendulum {},
+    /// [`DoubleIntegrator`]
+    DoubleIntegrator {},
+    /// [`Linear`]
+    Linear(LinearParameters),
+}
+
+/// A plant parameter that makes no plant.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum PlantParameterError {
+    /// A physical parameter that is not positive and finite.
+    #[error("{parameter} is {value}: it has to be a positive, finite number")]
+    NotPositive {
+        /// Which parameter.
+        parameter: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A matrix of the wrong size.
+    #[error("{matrix} is {rows} × {columns}: it has to be {expected}")]
+    Shape {
+        /// Which matrix.
+        matrix: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its columns; of the first row that differs from the others, if one does.
+        columns: usize,
+        /// What is allowed.
+        expected: String,
+    },
+    /// A matrix with a non-finite entry.
+    #[error("{matrix} has an entry that is not finite")]
+    NotFinite {
+        /// Which matrix.
+        matrix: &'static str,
+    },
+}
+
+impl PlantSpec {
+    /// The plant.
+    ///
+    /// # Errors
+    /// A parameter that is not positive and finite.
+    pub fn build(&self) -> Result<Box<dyn Plant>, PlantParameterError> {
+        match self {
+            PlantSpec::Quadrotor(parameters) => {
+                for (parameter, value) in parameters.named() {
+                    if !(value.is_finite() && value > 0.0) {
+                        return Err(PlantParameterError::NotPositive { parameter, value });
+                    }
+                }
+                Ok(Box::new(Quadrotor::new(*parameters)))
+            }
+            PlantSpec::Pendulum {} => Ok(Box::new(Pendulum::default())),
+            PlantSpec::DoubleIntegrator {} => Ok(Box::new(DoubleIntegrator::default())),
+            PlantSpec::Linear(parameters) => Ok(Box::new(Linear::new(parameters)?)),
+        }
+    }
+}

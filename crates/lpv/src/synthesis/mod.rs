@@ -1,0 +1,76 @@
+//! Synthesis: LPV model and weights in, [`Design`] out. One file a method.
+//!
+//! | file | method | thesis |
+//! |---|---|---|
+//! | `lpvqr` | quadratic regulator at each frozen parameter | Theorems 2.1, 4.5 |
+//! | `slpvqr` | the same under input saturation, low gain | Theorems 5.1, 5.3 |
+//! | `high_gain` | the same under input saturation, high gain | Theorems 5.2, 5.4 |
+//!
+//! All three are *frozen-parameter* designs: each grid point is solved as if the parameter stood still there. Their
+//! bounds hold for a parameter at rest; for a moving one nothing is claimed here.
+//!
+//! To add a method: one file with its inequalities, one variant in [`Method`].
+
+mod design;
+mod high_gain;
+mod inequality;
+mod lpvqr;
+mod region;
+mod slpvqr;
+
+pub use design::{CostWeights, Design, DesignError, DesignRequest, FrozenDesign, Method, ScheduleKind, design};
+pub use high_gain::HighGainOptions;
+pub use lpvqr::{STRICTNESS, lqr_by_inequality};
+pub use region::covering_level;
+
+/// Why there is no design.
+#[derive(Debug, thiserror::Error)]
+pub enum SynthesisError {
+    /// The Riccati equation has no stabilising solution.
+    #[error("no regulator exists at parameter {rho:.6}: {source}")]
+    Riccati {
+        /// Parameter value.
+        rho: f64,
+        /// The reason.
+        source: crate::math::riccati::RiccatiError,
+    },
+    /// The inequalities contradict each other.
+    #[error("the inequalities have no solution at parameter {rho:.6}; the contradiction is carried by: {}", carriers.join(", "))]
+    Infeasible {
+        /// Parameter value.
+        rho: f64,
+        /// The inequalities with the largest multipliers, largest first, with their share.
+        carriers: Vec<String>,
+    },
+    /// The objective is not bounded.
+    #[error("tr Y is unbounded at parameter {rho:.6}: some state costs nothing; give it a positive weight in Q")]
+    Unbounded {
+        /// Parameter value.
+        rho: f64,
+    },
+    /// The solver stopped short of the accuracy asked for.
+    #[error("the solver stopped short at parameter {rho:.6} ({reason}); try weights of less different size")]
+    Inaccurate {
+        /// Parameter value.
+        rho: f64,
+        /// Why.
+        reason: String,
+    },
+    /// An inequality problem that makes no sense was posed: a defect of this program.
+    #[error("ill-posed inequality problem: {0}")]
+    Problem(#[from] lmi::Error),
+    /// A saturated method needs a bound on every input.
+    #[error("input {input} has no limits, or limits that exclude its operating value")]
+    UnlimitedInput {
+        /// Index of the input.
+        input: usize,
+    },
+    /// No gain on the high-gain segment is stable at the controller's sample time.
+    #[error("no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster")]
+    SampleTime {
+        /// Parameter value.
+        rho: f64,
+        /// The sample time.
+        sample_time_s: f64,
+    },
+}

@@ -1,0 +1,321 @@
+// The report's data: what the program writes into the page, and the check that it is whole.
+//
+// All series of a run share the sample times `Report.time`; a sample that does not exist
+// (after a divergence) is null. Units are SI and radians; the page converts to degrees when it draws.
+
+/** What a claim is worth; see the legend under the table. */
+export type Verdict = "proved" | "numerical" | "refuted" | "undecided";
+
+/** Samples on `Report.time`; null where there is none. */
+export type Series = (number | null)[];
+
+/** A named quantity, such as `r_x` in `m`. */
+export interface Channel {
+  name: string;
+  /** SI unit; `rad` and `rad/s` are shown in degrees. Empty for a pure number. */
+  unit: string;
+}
+
+/** How to draw the plant in space. */
+export interface RigidBody {
+  kind: "rigid-body";
+  /** Indices into the states: x, y, z of the centre of mass, earth frame, z up. */
+  position: [number, number, number];
+  /** Indices into the states: roll φ, pitch θ, yaw ψ; body_from_earth = R_xyz(φ, θ, ψ). */
+  euler_xyz: [number, number, number];
+  /** Distance of a rotor from the centre. */
+  arm_length_m: number;
+  /** Rotor positions in the body frame, metres, in the order of the inputs. */
+  rotors: [number, number, number][];
+}
+
+/** The controlled plant: its signals and, if it moves in space, its shape. */
+export interface Plant {
+  name: string;
+  states: Channel[];
+  inputs: Channel[];
+  outputs: Channel[];
+  scene: RigidBody | null;
+}
+
+/** One claim about a design, as the certificate decided it. */
+export interface Claim {
+  claim: string;
+  verdict: Verdict;
+  detail: string;
+}
+
+/** How a simulation ended. */
+export type Outcome =
+  | { kind: "completed" }
+  | {
+      kind: "diverged";
+      time_s: number;
+      /** The state that left its bounds. */
+      state: string;
+      detail: string;
+    };
+
+/** Errors of the estimator against the true state, per state. */
+export interface Estimation {
+  error: Series[];
+  /** Three standard deviations, from the estimator's own covariance. */
+  sigma3: Series[];
+  /** Share of the samples inside ±3σ, 0 to 1. */
+  inside_share: number[];
+}
+
+/** One controller, flown once. */
+export interface Run {
+  id: string;
+  label: string;
+  /** Place in the palette; any non-negative integer. */
+  color_index: number;
+  /** One-line description. */
+  controller: string;
+  verdict: Verdict;
+  claims: Claim[];
+  outcome: Outcome;
+  /** Upper bound on the cost, or null; worth what `verdict` says, under the condition in the note. */
+  guaranteed_cost: number | null;
+  guaranteed_cost_note: string;
+  actual_cost: number | null;
+  settling_time_s: number | null;
+  /** Largest input over all channels, in the inputs' unit. */
+  peak_input: number;
+  /** Share of the time in which at least one input is at a limit, 0 to 1. */
+  saturated_share: number;
+  /** Per input; null means unlimited on that side. */
+  input_limits: { min: number | null; max: number | null }[];
+  /** [state][sample] */
+  states: Series[];
+  /** [input][sample], after saturation. */
+  inputs: Series[];
+  /** [weight][sample]: the scheduling weights ρᵢ. */
+  weights: Series[];
+  /** Cost accumulated so far. */
+  cost: Series;
+  /** [output][sample], with noise, or null when the state is known. */
+  measurement: Series[] | null;
+  estimation: Estimation | null;
+}
+
+/** The whole report. */
+export interface Report {
+  schema: "lpv-report/1";
+  title: string;
+  scenario: string;
+  description: string;
+  version: string;
+  seed: number;
+  plant: Plant;
+  scheduling: { parameter: string; unit: string; weights: string[] };
+  /** Sample times of all runs, seconds, increasing. */
+  time: number[];
+  /** Per state: the set point over time, or null when there is none to show. */
+  reference: (Series | null)[];
+  /** Set-point changes. */
+  steps: { time_s: number; label: string }[];
+  runs: Run[];
+  /** Warnings and remarks, plain text. */
+  notes: string[];
+}
+
+/** The data do not fit the schema; `problems` says where. */
+export class DataError extends Error {
+  constructor(readonly problems: string[]) {
+    super(problems.join("\n"));
+  }
+}
+
+const SCHEMA = "lpv-report/1";
+const VERDICTS: readonly string[] = ["proved", "numerical", "refuted", "undecided"];
+const MAX_PROBLEMS = 12;
+
+type Dict = Record<string, unknown>;
+
+/** Walks the data and collects what is wrong, each with its path. */
+class Checker {
+  readonly problems: string[] = [];
+
+  fail(path: string, expected: string, value: unknown): void {
+    if (this.problems.length < MAX_PROBLEMS) this.problems.push(`${path}: expected ${expected}, found ${describe(value)}`);
+  }
+
+  dict(value: unknown, path: string): Dict | null {
+    if (typeof value === "object" && value !== null && !Array.isArray(value)) return value as Dict;
+    this.fail(path, "an object", value);
+    return null;
+  }
+
+  list(value: unknown, path: string, length?: number): unknown[] {
+    if (!Array.isArray(value)) this.fail(path, "a list", value);
+    else if (length !== undefined && value.length !== length) this.fail(path, `a list of length ${length}`, value);
+    else return value;
+    return [];
+  }
+
+  text(value: unknown, path: string): void {
+    if (typeof value !== "string") this.fail(path, "a text", value);
+  }
+
+  number(value: unknown, path: string): void {
+    if (typeof value !== "number") this.fail(path, "a number", value);
+  }
+
+  numberOrNull(value: unknown, path: string): void {
+    if (value !== null) this.number(value, path);
+  }
+
+  verdict(value: unknown, path: string): void {
+    if (typeof value !== "string" || !VERDICTS.includes(value)) this.fail(path, `one of ${VERDICTS.join(", ")}`, value);
+  }
+
+  /** A series on the common sample times. */
+  series(value: unknown, path: string, samples: number): void {
+    const bad = this.list(value, path, samples).findIndex((v) => v !== null && typeof v !== "number");
+    if (bad >= 0) this.fail(`${path}[${bad}]`, "a number or null", (value as unknown[])[bad]);
+  }
+
+  table(value: unknown, path: string, rows: number, samples: number): void {
+    this.list(value, path, rows).forEach((row, i) => this.series(row, `${path}[${i}]`, samples));
+  }
+
+  channels(value: unknown, path: string): number {
+    const list = this.list(value, path);
+    list.forEach((item, i) => {
+      const channel = this.dict(item, `${path}[${i}]`);
+      if (!channel) return;
+      this.text(channel.name, `${path}[${i}].name`);
+      this.text(channel.unit, `${path}[${i}].unit`);
+    });
+    return list.length;
+  }
+}
+
+function describe(value: unknown): string {
+  if (value === undefined) return "nothing";
+  if (value === null) return "null";
+  if (Array.isArray(value)) return `a list of length ${value.length}`;
+  if (typeof value === "object") return "an object";
+  const text = JSON.stringify(value);
+  return text.length > 40 ? `${text.slice(0, 40)}…` : text;
+}
+
+function checkScene(check: Checker, value: unknown, states: number): void {
+  if (value === null) return;
+  const scene = check.dict(value, "plant.scene");
+  if (!scene) return;
+  if (scene.kind !== "rigid-body") check.fail("plant.scene.kind", '"rigid-body"', scene.kind);
+  for (const key of ["position", "euler_xyz"]) {
+    check.list(scene[key], `plant.scene.${key}`, 3).forEach((index, i) => {
+      const ok = typeof index === "number" && Number.isInteger(index) && index >= 0 && index < states;
+      if (!ok) check.fail(`plant.scene.${key}[${i}]`, `a state index below ${states}`, index);
+    });
+  }
+  check.number(scene.arm_length_m, "plant.scene.arm_length_m");
+  check.list(scene.rotors, "plant.scene.rotors").forEach((rotor, i) => {
+    check.list(rotor, `plant.scene.rotors[${i}]`, 3).forEach((v, k) => check.number(v, `plant.scene.rotors[${i}][${k}]`));
+  });
+}
+
+interface Sizes {
+  states: number;
+  inputs: number;
+  outputs: number;
+  weights: number;
+  samples: number;
+}
+
+function checkRun(check: Checker, value: unknown, path: string, size: Sizes): void {
+  const run = check.dict(value, path);
+  if (!run) return;
+  for (const key of ["id", "label", "controller", "guaranteed_cost_note"]) check.text(run[key], `${path}.${key}`);
+  for (const key of ["color_index", "peak_input", "saturated_share"]) check.number(run[key], `${path}.${key}`);
+  for (const key of ["guaranteed_cost", "actual_cost", "settling_time_s"]) check.numberOrNull(run[key], `${path}.${key}`);
+  check.verdict(run.verdict, `${path}.verdict`);
+  check.list(run.claims, `${path}.claims`).forEach((item, i) => {
+    const claim = check.dict(item, `${path}.claims[${i}]`);
+    if (!claim) return;
+    check.text(claim.claim, `${path}.claims[${i}].claim`);
+    check.text(claim.detail, `${path}.claims[${i}].detail`);
+    check.verdict(claim.verdict, `${path}.claims[${i}].verdict`);
+  });
+  const outcome = check.dict(run.outcome, `${path}.outcome`);
+  if (outcome && outcome.kind === "diverged") {
+    check.number(outcome.time_s, `${path}.outcome.time_s`);
+    check.text(outcome.state, `${path}.outcome.state`);
+    check.text(outcome.detail, `${path}.outcome.detail`);
+  } else if (outcome && outcome.kind !== "completed") {
+    check.fail(`${path}.outcome.kind`, '"completed" or "diverged"', outcome.kind);
+  }
+  check.list(run.input_limits, `${path}.input_limits`, size.inputs).forEach((item, i) => {
+    const limit = check.dict(item, `${path}.input_limits[${i}]`);
+    if (!limit) return;
+    check.numberOrNull(limit.min, `${path}.input_limits[${i}].min`);
+    check.numberOrNull(limit.max, `${path}.input_limits[${i}].max`);
+  });
+  check.table(run.states, `${path}.states`, size.states, size.samples);
+  check.table(run.inputs, `${path}.inputs`, size.inputs, size.samples);
+  check.table(run.weights, `${path}.weights`, size.weights, size.samples);
+  check.series(run.cost, `${path}.cost`, size.samples);
+  if (run.measurement !== null) check.table(run.measurement, `${path}.measurement`, size.outputs, size.samples);
+  if (run.estimation !== null) {
+    const estimation = check.dict(run.estimation, `${path}.estimation`);
+    if (!estimation) return;
+    check.table(estimation.error, `${path}.estimation.error`, size.states, size.samples);
+    check.table(estimation.sigma3, `${path}.estimation.sigma3`, size.states, size.samples);
+    check.list(estimation.inside_share, `${path}.estimation.inside_share`, size.states).forEach((v, i) => check.number(v, `${path}.estimation.inside_share[${i}]`));
+  }
+}
+
+/** Reads and checks the report; throws a `DataError` that names each place that does not fit. */
+export function parseReport(text: string): Report {
+  if (text.trim().startsWith("/*")) throw new DataError(["This page is the empty template: the program has not put any data into it."]);
+  let value: unknown;
+  try {
+    value = JSON.parse(text);
+  } catch (error) {
+    throw new DataError([`The data are not JSON: ${error instanceof Error ? error.message : String(error)}`]);
+  }
+  const check = new Checker();
+  const report = check.dict(value, "report");
+  if (!report) throw new DataError(check.problems);
+  if (report.schema !== SCHEMA) throw new DataError([`schema: this page reads ${SCHEMA}, the data are ${describe(report.schema)}. Page and program must be of one version.`]);
+
+  for (const key of ["title", "scenario", "description", "version"]) check.text(report[key], key);
+  check.number(report.seed, "seed");
+  const size: Sizes = { states: 0, inputs: 0, outputs: 0, weights: 0, samples: 0 };
+  const plant = check.dict(report.plant, "plant");
+  if (plant) {
+    check.text(plant.name, "plant.name");
+    size.states = check.channels(plant.states, "plant.states");
+    size.inputs = check.channels(plant.inputs, "plant.inputs");
+    size.outputs = check.channels(plant.outputs, "plant.outputs");
+    checkScene(check, plant.scene, size.states);
+  }
+  const scheduling = check.dict(report.scheduling, "scheduling");
+  if (scheduling) {
+    check.text(scheduling.parameter, "scheduling.parameter");
+    check.text(scheduling.unit, "scheduling.unit");
+    size.weights = check.list(scheduling.weights, "scheduling.weights").length;
+  }
+  const time = check.list(report.time, "time");
+  size.samples = time.length;
+  if (time.length < 2) check.fail("time", "at least two samples", report.time);
+  const bad = time.findIndex((t, i) => typeof t !== "number" || (i > 0 && !(t > (time[i - 1] as number))));
+  if (bad >= 0) check.fail(`time[${bad}]`, "a number above the one before", time[bad]);
+  check.list(report.reference, "reference", size.states).forEach((row, i) => {
+    if (row !== null) check.series(row, `reference[${i}]`, size.samples);
+  });
+  check.list(report.steps, "steps").forEach((item, i) => {
+    const step = check.dict(item, `steps[${i}]`);
+    if (!step) return;
+    check.number(step.time_s, `steps[${i}].time_s`);
+    check.text(step.label, `steps[${i}].label`);
+  });
+  check.list(report.runs, "runs").forEach((run, i) => checkRun(check, run, `runs[${i}]`, size));
+  check.list(report.notes, "notes").forEach((note, i) => check.text(note, `notes[${i}]`));
+  if (check.problems.length > 0) throw new DataError(check.problems);
+  return value as Report;
+}
