@@ -15,10 +15,10 @@ function runChecks(report: Report, run: Run, theme: Theme): HTMLElement {
   const counts = new Map<string, number>();
   for (const claim of run.claims) counts.set(claim.verdict, (counts.get(claim.verdict) ?? 0) + 1);
   const summary = [...counts].map(([verdict, count]) => `${count} ${verdict}`).join(", ");
-  const unsettled = run.claims.some((c) => c.verdict === "refuted" || c.verdict === "undecided");
+  const bad = run.outcome.kind === "diverged" || run.claims.some((c) => c.verdict === "refuted");
   return el(
     "details",
-    { class: "panel check-run", open: unsettled },
+    { class: "panel check-run", open: bad },
     el("summary", {}, letterBadge(report, run, theme), el("b", {}, run.label), el("span", { class: "muted" }, summary)),
     run.outcome.kind === "diverged" && el("p", { class: "outcome-bad" }, `Diverged at ${seconds(run.outcome.time_s)} in ${run.outcome.state}. ${run.outcome.detail}`),
     el(

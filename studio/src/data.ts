@@ -73,11 +73,13 @@ export interface Run {
   color_index: number;
   /** One-line description. */
   controller: string;
+  /** What is known of the design, whatever it flies. */
   verdict: Verdict;
   claims: Claim[];
   outcome: Outcome;
-  /** Upper bound on the cost, or null; worth what `verdict` says, under the condition in the note. */
+  /** Upper bound on the cost of this flight, or null; worth what its verdict says, under the condition in the note. */
   guaranteed_cost: number | null;
+  guaranteed_cost_verdict: Verdict;
   guaranteed_cost_note: string;
   actual_cost: number | null;
   settling_time_s: number | null;
@@ -234,6 +236,7 @@ function checkRun(check: Checker, value: unknown, path: string, size: Sizes): vo
   for (const key of ["color_index", "peak_input", "saturated_share"]) check.number(run[key], `${path}.${key}`);
   for (const key of ["guaranteed_cost", "actual_cost", "settling_time_s"]) check.numberOrNull(run[key], `${path}.${key}`);
   check.verdict(run.verdict, `${path}.verdict`);
+  check.verdict(run.guaranteed_cost_verdict, `${path}.guaranteed_cost_verdict`);
   check.list(run.claims, `${path}.claims`).forEach((item, i) => {
     const claim = check.dict(item, `${path}.claims[${i}]`);
     if (!claim) return;

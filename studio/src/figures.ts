@@ -39,12 +39,19 @@ function mainStates(report: Report): number[] {
   return referenced.length > 0 ? referenced : all;
 }
 
+/** Whether a run settles a full turn away from its set point, as it may when the error is wrapped. */
+function isFullTurnOff(report: Report, state: number): boolean {
+  const target = report.reference[state]?.at(-1) ?? null;
+  if (report.plant.states[state]!.unit !== "rad" || target === null) return false;
+  return report.runs.some((run) => run.outcome.kind === "completed" && Math.abs((run.states[state]?.at(-1) ?? target) - target) > 1.5 * Math.PI);
+}
+
 export function responses(report: Report): PlotGroup {
   const states = mainStates(report);
   return {
     id: "responses",
     title: report.plant.scene ? "Position and attitude" : "Responses",
-    caption: "Grey: set point.",
+    caption: `Grey: set point.${states.some((i) => isFullTurnOff(report, i)) ? " Angles a full turn apart are the same attitude." : ""}`,
     rows: Math.ceil(states.length / 2),
     plots: states.map((i) => statePlot(report, i)),
   };

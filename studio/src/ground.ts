@@ -9,7 +9,7 @@ import { niceStep } from "./samples";
 import type { Theme } from "./theme";
 
 /** Grid squares along the longer side, about. */
-const SQUARES = 9;
+const SQUARES = 7;
 const LABEL_OUT = 0.45;
 /** Cosine of the angle to the line of sight from which on an axis is seen end on. */
 const END_ON = 0.97;

@@ -19,7 +19,7 @@ import { Triad } from "./triad";
 import { fullThrust, Vehicle } from "./vehicle";
 
 /** A vehicle spans at least this share of the picture; if to scale it would be less, it is drawn larger. */
-const LEAST_SHARE = 1 / 10;
+const LEAST_SHARE = 1 / 7.5;
 const SCALES = [1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300, 500, 1000];
 const MARK_EVERY_S = [1, 2, 5, 10, 30, 60, 300, 600];
 const MOST_MARKS = 120;
@@ -64,7 +64,7 @@ class Scene {
   private readonly view = el("div", { class: "scene-view" });
   private readonly follow = el("select", { id: "follow", "aria-label": "Follow with the camera" });
   private readonly time = el("b", { id: "scene-time" });
-  private readonly pose = el("span", { id: "scene-pose" });
+  private readonly pose = el("span", { id: "scene-pose", class: "scene-pose" });
   private readonly scale: number;
   private readonly markEvery_s: number;
   private width = 0;
@@ -169,7 +169,7 @@ class Scene {
     return el(
       "div",
       { class: "scene-status" },
-      el("span", {}, this.time),
+      el("span", { class: "scene-time" }, this.time),
       el("span", { id: "scene-scale" }, scale),
       el("span", {}, `grid ${this.ground.step} m`),
       el("span", {}, `a mark every ${this.markEvery_s === 1 ? "second" : `${this.markEvery_s} s`}`),

@@ -7,7 +7,7 @@ import { number, percent, seconds } from "./format";
 import type { Selection } from "./selection";
 import type { Theme } from "./theme";
 
-const COLUMNS = ["Controller", "Verdict", "Guaranteed cost", "Actual cost", "Settling time", "Peak input", "Saturated", "Outcome"] as const;
+const COLUMNS = ["Controller", "Design", "Guaranteed cost", "Actual cost", "Settling time", "Peak input", "Saturated", "Outcome"] as const;
 
 export function comparisonTable(report: Report, selection: Selection, theme: Theme): HTMLElement {
   const unit = report.plant.inputs[0]?.unit ?? "";
@@ -39,7 +39,7 @@ function tableRow(report: Report, run: Run, unit: string, selection: Selection, 
     },
     el("td", { class: "col-show" }, checkbox),
     el("th", { scope: "row", class: "col-name" }, el("div", { class: "run-head" }, letterBadge(report, run, theme), name, lineSample(run, theme)), el("div", { class: "run-sub" }, run.controller)),
-    cell("Verdict", "col-verdict", verdictChip(run.verdict)),
+    cell("Design", "col-verdict", verdictChip(run.verdict)),
     cell("Guaranteed cost", "num col-bound", ...guaranteedCost(run)),
     cell("Actual cost", "num", ...actualCost(run)),
     cell("Settling time", "num", run.settling_time_s === null ? dash("not settled") : seconds(run.settling_time_s)),
@@ -65,7 +65,7 @@ function tableRow(report: Report, run: Run, unit: string, selection: Selection, 
 function guaranteedCost(run: Run): (Node | string)[] {
   const note = run.guaranteed_cost_note;
   if (run.guaranteed_cost === null) return [dash("no bound"), ...(note === "" ? [] : [el("div", { class: "run-sub" }, note)])];
-  const small = el("div", { class: "run-sub" }, el("span", { class: `word-${run.verdict}` }, run.verdict), note === "" ? "" : ` · ${note}`);
+  const small = el("div", { class: "run-sub" }, el("span", { class: `word-${run.guaranteed_cost_verdict}` }, run.guaranteed_cost_verdict), note === "" ? "" : ` · ${note}`);
   return [`≤ ${number(run.guaranteed_cost, 5)}`, small];
 }
 

@@ -11,7 +11,7 @@ import { marker, type Theme } from "./theme";
 
 const WIDTH_PX = 2.2;
 const WIDTH_HIGHLIGHTED_PX = 3.6;
-const MARKER_PX = 12;
+const MARKER_PX = 10;
 const END_PX = 17;
 
 export class Trail {

@@ -166,6 +166,7 @@ function makeRun(spec, index, { time, duration_s, steps, estimation }) {
     color_index: index,
     controller: spec.controller,
     verdict: spec.verdict,
+    guaranteed_cost_verdict: spec.verdict,
     claims: [
       { claim: "Every LMI block is positive definite", verdict: spec.verdict === "proved" ? "proved" : "numerical", detail: "smallest eigenvalue 3.2e-7 over 32 yaws, recomputed from the model" },
       { claim: "The closed loop is stable at each frozen yaw", verdict: "numerical", detail: "largest real part −0.7071 over 720 yaws" },

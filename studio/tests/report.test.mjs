@@ -77,7 +77,7 @@ for (const screen of ["desktop", "phone"]) {
           const text = await rows.nth(i).innerText();
           assert.ok(text.includes(run.label), `row ${i} names ${run.label}`);
           const bound = await rows.nth(i).locator(".col-bound").innerText();
-          if (run.guaranteed_cost !== null) assert.ok(bound.includes(run.verdict), `the bound of ${run.label} shows its verdict`);
+          if (run.guaranteed_cost !== null) assert.ok(bound.includes(run.guaranteed_cost_verdict), `the bound of ${run.label} shows its verdict`);
           if (run.outcome.kind === "diverged") assert.match(text, /diverged at/);
         }
       });

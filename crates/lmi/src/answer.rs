@@ -44,8 +44,7 @@ pub struct Ray {
     /// The direction, one matrix per unknown in the order made.
     #[serde(serialize_with = "nested_rows")]
     pub direction: Vec<Mat<f64>>,
-    /// Smallest eigenvalue over all blocks of the linear part at the direction, recomputed, relative to
-    /// the largest. Not negative beyond rounding.
+    /// Smallest eigenvalue of `Σ dᵢ F_{b,i}` over all blocks, recomputed. Not negative beyond rounding.
     pub smallest_eigenvalue: f64,
 }
 
@@ -159,8 +158,13 @@ impl Answer {
 }
 
 /// Matrices as lists of rows.
-fn nested_rows<S: serde::Serializer>(matrices: &[Mat<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+fn nested_rows<S: serde::Serializer>(
+    matrices: &[Mat<f64>],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(matrices.iter().map(|m| -> Vec<Vec<f64>> {
-        (0..m.nrows()).map(|i| (0..m.ncols()).map(|j| m[(i, j)]).collect()).collect()
+        (0..m.nrows())
+            .map(|i| (0..m.ncols()).map(|j| m[(i, j)]).collect())
+            .collect()
     }))
 }

@@ -86,7 +86,11 @@ impl Block {
             Self::Dense(block) => OperatorScratch {
                 factored: block.factored.scratch(),
                 sparse: block.sparse.scratch(),
-                mixed: if block.factored.is_empty() || block.sparse.is_empty() { vec![] } else { vec![0.0; unknowns] },
+                mixed: if block.factored.is_empty() || block.sparse.is_empty() {
+                    vec![]
+                } else {
+                    vec![0.0; unknowns]
+                },
             },
             Self::Diagonal(_) => OperatorScratch::default(),
         }
@@ -101,7 +105,10 @@ impl Block {
             }
             Self::Diagonal(block) => {
                 for (out, row) in out.iter_mut().zip(&block.rows) {
-                    *out += row.iter().map(|&(unknown, value)| value * x[unknown]).sum::<f64>();
+                    *out += row
+                        .iter()
+                        .map(|&(unknown, value)| value * x[unknown])
+                        .sum::<f64>();
                 }
             }
         }
@@ -111,12 +118,15 @@ impl Block {
     pub fn adjoint(&self, factor: f64, h: &[f64], out: &mut [f64], scratch: &mut OperatorScratch) {
         match self {
             Self::Dense(block) => {
-                block.factored.adjoint(factor, h, out, &mut scratch.factored);
+                block
+                    .factored
+                    .adjoint(factor, h, out, &mut scratch.factored);
                 block.sparse.adjoint(factor, h, out);
             }
             Self::Diagonal(block) => {
                 for (h, row) in h.iter().zip(&block.rows) {
-                    row.iter().for_each(|&(unknown, value)| out[unknown] += factor * value * h);
+                    row.iter()
+                        .for_each(|&(unknown, value)| out[unknown] += factor * value * h);
                 }
             }
         }
@@ -134,29 +144,48 @@ impl Block {
                 for &(unknown, value) in block.rows.iter().flatten() {
                     squares[unknown] += value * value;
                 }
-                out.iter_mut().zip(squares).for_each(|(out, square)| *out = out.max(square.sqrt()));
+                out.iter_mut()
+                    .zip(squares)
+                    .for_each(|(out, square)| *out = out.max(square.sqrt()));
             }
         }
     }
 
     /// M ← M + tr(F_i P F_j Z), lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
-    pub fn schur(&self, p: &[f64], z: &[f64], m: &mut [f64], unknowns: usize, scratch: &mut OperatorScratch) {
+    pub fn schur(
+        &self,
+        p: &[f64],
+        z: &[f64],
+        m: &mut [f64],
+        unknowns: usize,
+        scratch: &mut OperatorScratch,
+    ) {
         match self {
             Self::Dense(block) => {
-                let OperatorScratch { factored, sparse, mixed } = scratch;
+                let OperatorScratch {
+                    factored,
+                    sparse,
+                    mixed,
+                } = scratch;
                 if !block.factored.is_empty() {
                     block.factored.schur(p, z, m, unknowns, factored);
                 }
                 let both = !block.factored.is_empty();
-                block.sparse.schur(p, z, m, unknowns, sparse, both, |unknown, h, m| {
-                    mixed.fill(0.0);
-                    block.factored.adjoint(1.0, h, mixed, factored);
-                    for (other, value) in mixed.iter().enumerate() {
-                        // An unknown with both a sparse and a factored part meets itself from both sides.
-                        let value = if other == unknown { 2.0 * value } else { *value };
-                        m[other.max(unknown) + other.min(unknown) * unknowns] += value;
-                    }
-                });
+                block
+                    .sparse
+                    .schur(p, z, m, unknowns, sparse, both, |unknown, h, m| {
+                        mixed.fill(0.0);
+                        block.factored.adjoint(1.0, h, mixed, factored);
+                        for (other, value) in mixed.iter().enumerate() {
+                            // An unknown with both a sparse and a factored part meets itself from both sides.
+                            let value = if other == unknown {
+                                2.0 * value
+                            } else {
+                                *value
+                            };
+                            m[other.max(unknown) + other.min(unknown) * unknowns] += value;
+                        }
+                    });
             }
             Self::Diagonal(block) => {
                 for ((p, z), row) in p.iter().zip(z).zip(&block.rows) {

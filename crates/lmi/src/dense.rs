@@ -20,7 +20,10 @@ impl Scratch {
         let factor = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
         let inverse = llt::inverse::inverse_scratch::<f64>(n, Par::Seq);
         let solve = llt::solve::solve_in_place_scratch::<f64>(n, 1, Par::Seq);
-        Self { buffer: MemBuffer::new(factor.or(inverse).or(solve)), matrix: vec![0.0; SMALL * SMALL] }
+        Self {
+            buffer: MemBuffer::new(factor.or(inverse).or(solve)),
+            matrix: vec![0.0; SMALL * SMALL],
+        }
     }
 }
 
@@ -111,7 +114,11 @@ pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], scratch:
     out.fill(0.0);
     for (k, column) in transposed.chunks_exact(n).enumerate() {
         for j in 0..=k {
-            axpy(column[j], &column[j..=k], &mut out[j * n + j..j * n + k + 1]);
+            axpy(
+                column[j],
+                &column[j..=k],
+                &mut out[j * n + j..j * n + k + 1],
+            );
         }
     }
     mirror_lower(n, out);
@@ -158,7 +165,12 @@ pub(crate) fn axpy(factor: f64, x: &[f64], y: &mut [f64]) {
 pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (xs, ys) = (x.chunks_exact(8), y.chunks_exact(8));
-    let tail: f64 = xs.remainder().iter().zip(ys.remainder()).map(|(x, y)| x * y).sum();
+    let tail: f64 = xs
+        .remainder()
+        .iter()
+        .zip(ys.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in xs.zip(ys) {
         for k in 0..8 {
             sums[k] += x[k] * y[k];

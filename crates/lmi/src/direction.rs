@@ -77,12 +77,19 @@ impl BlockState {
     pub fn update_residual(&mut self, block: &Block, x: &[f64]) {
         self.residual.copy_from_slice(block.constant());
         block.apply(x, &mut self.residual, &mut self.operator);
-        self.residual.iter_mut().zip(&self.s).for_each(|(r, s)| *r -= s);
+        self.residual
+            .iter_mut()
+            .zip(&self.s)
+            .for_each(|(r, s)| *r -= s);
     }
 
     /// Replaces S by F(x) = S + R when that is positive definite; the residual is then zero.
     pub fn close_residual(&mut self, scratch: &mut Scratch) -> bool {
-        self.work.iter_mut().zip(&self.s).zip(&self.residual).for_each(|((w, s), r)| *w = s + r);
+        self.work
+            .iter_mut()
+            .zip(&self.s)
+            .zip(&self.residual)
+            .for_each(|((w, s), r)| *w = s + r);
         self.s_factor.copy_from_slice(&self.work);
         let done = factorize(self.diagonal, self.n, &mut self.s_factor, scratch);
         if done {
@@ -98,8 +105,14 @@ impl BlockState {
     /// The inverses of S and Z from their factors.
     pub fn invert(&mut self, scratch: &mut Scratch) {
         if self.diagonal {
-            self.s_inverse.iter_mut().zip(&self.s).for_each(|(p, s)| *p = 1.0 / s);
-            self.z_inverse.iter_mut().zip(&self.z).for_each(|(p, z)| *p = 1.0 / z);
+            self.s_inverse
+                .iter_mut()
+                .zip(&self.s)
+                .for_each(|(p, s)| *p = 1.0 / s);
+            self.z_inverse
+                .iter_mut()
+                .zip(&self.z)
+                .for_each(|(p, z)| *p = 1.0 / z);
             return;
         }
         dense::inverse_from_factor(self.n, &self.s_factor, &mut self.s_inverse, scratch);
@@ -113,7 +126,13 @@ impl BlockState {
             return;
         }
         if self.diagonal {
-            for (((g, p), r), z) in self.g.iter_mut().zip(&self.s_inverse).zip(&self.residual).zip(&self.z) {
+            for (((g, p), r), z) in self
+                .g
+                .iter_mut()
+                .zip(&self.s_inverse)
+                .zip(&self.residual)
+                .zip(&self.z)
+            {
                 *g = -p * r * z;
             }
             return;
@@ -162,14 +181,21 @@ impl BlockState {
             *dz = g - z - *dz;
         }
         if !feasible {
-            self.ds.iter_mut().zip(&self.residual).for_each(|(ds, r)| *ds += r);
+            self.ds
+                .iter_mut()
+                .zip(&self.residual)
+                .for_each(|(ds, r)| *ds += r);
             dense::multiply(self.n, &self.s_inverse, &self.ds, &mut self.p_ds);
         }
     }
 
     /// out ← out − A(Z + dZ).
     pub fn subtract_dual(&mut self, block: &Block, out: &mut [f64]) {
-        self.work.iter_mut().zip(&self.z).zip(&self.dz).for_each(|((w, z), dz)| *w = z + dz);
+        self.work
+            .iter_mut()
+            .zip(&self.z)
+            .zip(&self.dz)
+            .for_each(|((w, z), dz)| *w = z + dz);
         block.adjoint(-1.0, &self.work, out, &mut self.operator);
     }
 
@@ -191,11 +217,32 @@ impl BlockState {
         dense::axpy(-1.0, &self.work, &mut self.dz);
     }
 
+    /// The identity, in the block's storage.
+    pub fn identity(&self) -> Vec<f64> {
+        if self.diagonal {
+            return vec![1.0; self.n];
+        }
+        let mut identity = vec![0.0; self.n * self.n];
+        (0..self.n).for_each(|i| identity[i + i * self.n] = 1.0);
+        identity
+    }
+
+    /// dZ ← F(y) − F(0), dS ← 0.
+    pub fn propose_dual(&mut self, block: &Block, y: &[f64]) {
+        self.ds.fill(0.0);
+        self.dz.fill(0.0);
+        block.apply(y, &mut self.dz, &mut self.operator);
+    }
+
     /// Estimates of the longest steps that keep S and Z positive semidefinite.
     pub fn longest_steps(&self, lanczos: &mut Lanczos, accuracy: f64) -> (f64, f64) {
         if self.diagonal {
             let ratio = |value: &[f64], step: &[f64]| {
-                let ends = value.iter().zip(step).filter(|(_, step)| **step < 0.0).map(|(v, d)| -v / d);
+                let ends = value
+                    .iter()
+                    .zip(step)
+                    .filter(|(_, step)| **step < 0.0)
+                    .map(|(v, d)| -v / d);
                 ends.fold(f64::INFINITY, f64::min)
             };
             return (ratio(&self.s, &self.ds), ratio(&self.z, &self.dz));

@@ -20,7 +20,9 @@ pub enum Error {
         value: f64,
     },
     /// The left side of an inequality is not square.
-    #[error("inequality \"{name}\" is {rows} × {columns}: a square, symmetric expression is needed")]
+    #[error(
+        "inequality \"{name}\" is {rows} × {columns}: a square, symmetric expression is needed"
+    )]
     NotSquare {
         /// The inequality.
         name: String,
@@ -53,7 +55,9 @@ pub enum Error {
         columns: usize,
     },
     /// An expression holds an unknown of another problem.
-    #[error("{place} holds an unknown of another problem: make all unknowns with the problem that is solved")]
+    #[error(
+        "{place} holds an unknown of another problem: make all unknowns with the problem that is solved"
+    )]
     ForeignUnknown {
         /// The inequality or objective.
         place: String,
@@ -67,7 +71,9 @@ pub enum Error {
         allowed: usize,
     },
     /// An entry of an [`Sdp`](crate::sdpa::Sdp) has no place in it.
-    #[error("F{matrix} has an entry in block {block} at ({row}, {column}), counted from 0: the problem has no such place")]
+    #[error(
+        "F{matrix} has an entry in block {block} at ({row}, {column}), counted from 0: the problem has no such place"
+    )]
     BadCoefficient {
         /// The coefficient matrix, 0 for F₀.
         matrix: usize,

@@ -32,7 +32,13 @@ impl Columns {
         if self.starts.is_empty() {
             self.starts.push(0);
         }
-        self.entries.extend(column.iter().copied().enumerate().filter(|(_, value)| *value != 0.0));
+        self.entries.extend(
+            column
+                .iter()
+                .copied()
+                .enumerate()
+                .filter(|(_, value)| *value != 0.0),
+        );
         self.starts.push(self.entries.len());
     }
 
@@ -98,16 +104,35 @@ impl Factored {
             let first = rows.len();
             for (at, &position) in stack.positions.iter().enumerate() {
                 let entry = (at / cols, at % cols);
-                match rows[first..].iter_mut().find(|row| row.position == position && row.count == 1) {
+                match rows[first..]
+                    .iter_mut()
+                    .find(|row| row.position == position && row.count == 1)
+                {
                     Some(row) => {
                         row.entries[1] = entry;
                         row.count = 2;
                     }
-                    None => rows.push(Row { position, group: groups.len(), entries: [entry; 2], count: 1 }),
+                    None => rows.push(Row {
+                        position,
+                        group: groups.len(),
+                        entries: [entry; 2],
+                        count: 1,
+                    }),
                 }
             }
-            let last = stack.positions.chunks(cols).map(|c| c.iter().copied().max().unwrap_or(0)).collect();
-            groups.push(Group { u, rows: count, v, cols, positions: stack.positions, last });
+            let last = stack
+                .positions
+                .chunks(cols)
+                .map(|c| c.iter().copied().max().unwrap_or(0))
+                .collect();
+            groups.push(Group {
+                u,
+                rows: count,
+                v,
+                cols,
+                positions: stack.positions,
+                last,
+            });
         }
         Self { n, w, groups, rows }
     }
@@ -118,7 +143,12 @@ impl Factored {
 
     pub fn scratch(&self) -> FactoredScratch {
         let w = self.w.len();
-        let longest = self.groups.iter().map(|g| g.positions.len()).max().unwrap_or(0);
+        let longest = self
+            .groups
+            .iter()
+            .map(|g| g.positions.len())
+            .max()
+            .unwrap_or(0);
         FactoredScratch {
             product: vec![0.0; self.n * w],
             wpw: vec![0.0; w * w],
@@ -135,7 +165,10 @@ impl Factored {
             t.fill(0.0);
             for r in 0..group.rows {
                 for &(i, value) in self.w.column(group.u + r) {
-                    for (s, position) in group.positions[r * group.cols..][..group.cols].iter().enumerate() {
+                    for (s, position) in group.positions[r * group.cols..][..group.cols]
+                        .iter()
+                        .enumerate()
+                    {
                         t[i + s * n] += value * x[*position];
                     }
                 }
@@ -162,7 +195,12 @@ impl Factored {
                     axpy(2.0 * factor * value, &h[i * n..(i + 1) * n], hv);
                 }
                 for r in 0..group.rows {
-                    let inner: f64 = self.w.column(group.u + r).iter().map(|&(i, value)| value * hv[i]).sum();
+                    let inner: f64 = self
+                        .w
+                        .column(group.u + r)
+                        .iter()
+                        .map(|&(i, value)| value * hv[i])
+                        .sum();
                     out[group.positions[r * group.cols + s]] += inner;
                 }
             }
@@ -171,7 +209,14 @@ impl Factored {
 
     /// out_i ← max(out_i, estimate of ‖F_i‖_F).
     pub fn norms(&self, out: &mut [f64]) {
-        let length = |j: usize| self.w.column(j).iter().map(|(_, v)| v * v).sum::<f64>().sqrt();
+        let length = |j: usize| {
+            self.w
+                .column(j)
+                .iter()
+                .map(|(_, v)| v * v)
+                .sum::<f64>()
+                .sqrt()
+        };
         for group in &self.groups {
             for r in 0..group.rows {
                 for s in 0..group.cols {
@@ -184,8 +229,20 @@ impl Factored {
     }
 
     /// M ← M + tr(F_i P F_j Z), lower triangle (j ≤ i stored at `m[i + j·N]`).
-    pub fn schur(&self, p: &[f64], z: &[f64], m: &mut [f64], unknowns: usize, scratch: &mut FactoredScratch) {
-        let FactoredScratch { product, wpw, wzw, row: buffer } = scratch;
+    pub fn schur(
+        &self,
+        p: &[f64],
+        z: &[f64],
+        m: &mut [f64],
+        unknowns: usize,
+        scratch: &mut FactoredScratch,
+    ) {
+        let FactoredScratch {
+            product,
+            wpw,
+            wzw,
+            row: buffer,
+        } = scratch;
         self.project(p, product, wpw);
         self.project(z, product, wzw);
         let w = self.w.len();
@@ -210,7 +267,9 @@ impl Factored {
                         let (a, b) = (of(wpw, vq, ur), of(wzw, up, ur));
                         let (c, d) = (of(wpw, up, ur), of(wzw, vq, ur));
                         let out = &mut buffer[r * h.cols..(r + 1) * h.cols];
-                        for ((((out, zu), pv), zv), pu) in out.iter_mut().zip(zu).zip(pv).zip(zv).zip(pu) {
+                        for ((((out, zu), pv), zv), pu) in
+                            out.iter_mut().zip(zu).zip(pv).zip(zv).zip(pu)
+                        {
                             *out += a * zu + b * pv + c * zv + d * pu;
                         }
                     }
@@ -233,7 +292,12 @@ impl Factored {
                 axpy(value, &h[i * n..(i + 1) * n], hw);
             }
             for k in 0..=j {
-                let inner: f64 = self.w.column(k).iter().map(|&(i, value)| value * hw[i]).sum();
+                let inner: f64 = self
+                    .w
+                    .column(k)
+                    .iter()
+                    .map(|&(i, value)| value * hw[i])
+                    .sum();
                 out[k + j * w] = inner;
                 out[j + k * w] = inner;
             }

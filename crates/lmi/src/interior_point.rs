@@ -4,8 +4,10 @@
 //! Optim. Methods Softw. 11, 1999). The direction does not change when a block is replaced by a congruent one
 //! or the unknowns by linear combinations, so that scaling matters for the starting point and the stopping rule only.
 
+mod certificate;
+
 use crate::answer::{InaccurateReason, IterationLog, Residuals};
-use crate::block::Program;
+use crate::block::{Block, Program};
 use crate::dense::{Scratch, dot, norm};
 use crate::direction::BlockState;
 use crate::lanczos::Lanczos;
@@ -19,8 +21,10 @@ const SOLVED_GAP: f64 = 1e-7;
 /// A multiplier is a witness of infeasibility when its residual is this small against the dual objective.
 const CERTIFICATE: f64 = 1e-8;
 
+/// From here on it is tried to complete a multiplier to an exact witness.
+const NEAR_CERTIFICATE: f64 = 1e-3;
 /// Rounds of refinement of one direction at most.
-const REFINEMENTS: usize = 4;
+const REFINEMENTS: usize = 10;
 
 /// A point of the iteration.
 #[derive(Clone, Debug, Default)]
@@ -52,13 +56,16 @@ pub(crate) struct Solution {
 
 /// Everything the iteration works on.
 struct Iteration<'a> {
-    program: &'a Program,
+    operators: &'a [Block],
+    objective: &'a [f64],
     options: &'a Options,
     blocks: Vec<BlockState>,
     x: Vec<f64>,
     /// A(Z).
     az: Vec<f64>,
     schur: Schur,
+    /// The matrix of A(F(y)), factorised when first needed.
+    gram: Option<Schur>,
     scratch: Scratch,
     lanczos: Lanczos,
     right_side: Vec<f64>,
@@ -85,16 +92,39 @@ impl Status {
     /// At most 1 for a point that may be called solved.
     fn merit(&self, options: &Options) -> f64 {
         let Residuals { primal, dual, gap } = self.residuals;
-        let feasibility = primal.max(dual) / options.feasibility_tolerance;
-        let merit = feasibility.max(gap / SOLVED_GAP);
+        let feasibility = nan_max(primal, dual) / options.feasibility_tolerance;
+        let merit = nan_max(feasibility, gap / SOLVED_GAP);
         if merit.is_nan() { f64::INFINITY } else { merit }
     }
 }
 
 /// Solves a program in the solver's form.
+///
+/// A direction without end says nothing about whether there is a feasible point to start from: where the iteration has not seen
+/// one, a second one without objective decides between infeasible and unbounded.
 pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
     let started = Instant::now();
-    let mut it = Iteration::new(program, options);
+    let solution = iterate(&program.blocks, &program.objective, options, started);
+    let unseen = solution.residuals.primal > options.feasibility_tolerance;
+    if matches!(solution.ending, Ending::DualInfeasible(_)) && unseen {
+        let zero = vec![0.0; program.objective.len()];
+        let feasibility = iterate(&program.blocks, &zero, options, started);
+        match feasibility.ending {
+            Ending::PrimalInfeasible => return feasibility,
+            Ending::Converged => {
+                return Solution {
+                    point: feasibility.point,
+                    ..solution
+                };
+            }
+            _ => {}
+        }
+    }
+    solution
+}
+
+fn iterate(blocks: &[Block], objective: &[f64], options: &Options, started: Instant) -> Solution {
+    let mut it = Iteration::new(blocks, objective, options);
     let mut log: Vec<IterationLog> = Vec::new();
     let mut best: Option<(f64, Status, Point)> = None;
     let mut since_progress = 0;
@@ -123,7 +153,7 @@ pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
             break Ending::Converged;
         }
         let witness = it.witness_residual(&status);
-        if witness <= CERTIFICATE {
+        if witness <= CERTIFICATE || (witness <= NEAR_CERTIFICATE && it.complete_witness()) {
             best = Some((merit, status, it.point()));
             break Ending::PrimalInfeasible;
         }
@@ -131,25 +161,43 @@ pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
             best = Some((merit, status, it.point()));
             break Ending::DualInfeasible(ray);
         }
-        since_progress = if much || witness < 0.9 * best_witness { 0 } else { since_progress + 1 };
+        since_progress = if much || witness < 0.9 * best_witness {
+            0
+        } else {
+            since_progress + 1
+        };
         best_witness = best_witness.min(witness);
-        if let Some(reason) = it.interrupted(log.len(), since_progress, started) {
+        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) {
+            3
+        } else {
+            15
+        };
+        if since_progress > patience {
+            break Ending::Stopped(InaccurateReason::Stalled);
+        }
+        if let Some(reason) = it.interrupted(log.len(), started) {
             break Ending::Stopped(reason);
         }
         match it.step(&status) {
             Some((centring, primal_step, dual_step)) => {
                 if let Some(entry) = log.last_mut() {
-                    (entry.centring, entry.primal_step, entry.dual_step) = (centring, primal_step, dual_step);
+                    (entry.centring, entry.primal_step, entry.dual_step) =
+                        (centring, primal_step, dual_step);
                 }
             }
             None => break Ending::Stopped(InaccurateReason::Stalled),
         }
     };
-    let (merit, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));
+    let solved = best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0);
     let ending = match ending {
-        Ending::Stopped(_) if merit <= 1.0 => Ending::Converged,
+        Ending::Stopped(_) if solved => Ending::Converged,
+        Ending::Stopped(InaccurateReason::Stalled) => match it.ray_in_null_space() {
+            Some(ray) => Ending::DualInfeasible(ray),
+            None => ending,
+        },
         other => other,
     };
+    let (_, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));
     Solution {
         point,
         ending,
@@ -160,22 +208,28 @@ pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
 }
 
 impl<'a> Iteration<'a> {
-    fn new(program: &'a Program, options: &'a Options) -> Self {
-        let unknowns = program.objective.len();
-        let scales = start::scales(program);
-        let blocks: Vec<BlockState> = program
-            .blocks
+    fn new(operators: &'a [Block], objective: &'a [f64], options: &'a Options) -> Self {
+        let unknowns = objective.len();
+        let scales = start::scales(operators, objective);
+        let blocks: Vec<BlockState> = operators
             .iter()
             .zip(scales)
             .map(|(block, (eta, xi))| BlockState::new(block, unknowns, eta, xi))
             .collect();
-        let largest = program.blocks.iter().filter(|b| !b.is_diagonal()).map(|b| b.size()).max().unwrap_or(1);
+        let largest = operators
+            .iter()
+            .filter(|b| !b.is_diagonal())
+            .map(|b| b.size())
+            .max()
+            .unwrap_or(1);
         Self {
-            program,
+            operators,
+            objective,
             options,
             x: vec![0.0; unknowns],
             az: vec![0.0; unknowns],
             schur: Schur::new(unknowns),
+            gram: None,
             scratch: Scratch::new(largest),
             lanczos: Lanczos::new(largest),
             right_side: vec![0.0; unknowns],
@@ -183,20 +237,23 @@ impl<'a> Iteration<'a> {
             change: vec![0.0; unknowns],
             order: blocks.iter().map(|b| b.n as f64).sum(),
             feasible: false,
-            constant_norms: program.blocks.iter().map(|b| norm(b.constant())).collect(),
-            objective_norm: program.objective.iter().fold(0.0, |m, c| m.max(c.abs())),
+            constant_norms: operators.iter().map(|b| norm(b.constant())).collect(),
+            objective_norm: objective.iter().fold(0.0, |m, c| m.max(c.abs())),
             blocks,
         }
     }
 
     fn point(&self) -> Point {
-        Point { x: self.x.clone(), z: self.blocks.iter().map(|b| b.z.clone()).collect() }
+        Point {
+            x: self.x.clone(),
+            z: self.blocks.iter().map(|b| b.z.clone()).collect(),
+        }
     }
 
     /// R = F(x) − S, closed exactly as soon as F(x) itself is positive definite; A(Z).
     fn update_residuals(&mut self) {
         let mut closed = true;
-        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.update_residual(block, &self.x);
         }
         let worst = self.primal_residual();
@@ -207,86 +264,104 @@ impl<'a> Iteration<'a> {
             self.feasible = closed;
         }
         self.az.fill(0.0);
-        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             block.adjoint(1.0, &state.z, &mut self.az, &mut state.operator);
         }
     }
 
     fn primal_residual(&self) -> f64 {
-        let relative = self.blocks.iter().zip(&self.constant_norms).map(|(b, c)| norm(&b.residual) / (1.0 + c));
+        let relative = self
+            .blocks
+            .iter()
+            .zip(&self.constant_norms)
+            .map(|(b, c)| norm(&b.residual) / (1.0 + c));
         relative.fold(0.0, nan_max)
     }
 
+    fn dual_residual(&self) -> f64 {
+        let differences = self
+            .objective
+            .iter()
+            .zip(&self.az)
+            .map(|(c, a)| (c - a).abs());
+        differences.fold(0.0, nan_max) / (1.0 + self.objective_norm)
+    }
+
     fn status(&self) -> Status {
-        let objective = dot(&self.program.objective, &self.x);
-        let dual_objective =
-            -self.program.blocks.iter().zip(&self.blocks).map(|(b, s)| dot(b.constant(), &s.z)).sum::<f64>();
+        let objective = dot(self.objective, &self.x);
+        let dual_objective = -self
+            .operators
+            .iter()
+            .zip(&self.blocks)
+            .map(|(b, s)| dot(b.constant(), &s.z))
+            .sum::<f64>();
         let complementarity: f64 = self.blocks.iter().map(|b| dot(&b.s, &b.z)).sum();
-        let dual = self.program.objective.iter().zip(&self.az).map(|(c, a)| (c - a).abs()).fold(0.0, nan_max);
         let residuals = Residuals {
             primal: self.primal_residual(),
-            dual: dual / (1.0 + self.objective_norm),
-            gap: (objective - dual_objective).abs() / (1.0 + objective.abs() + dual_objective.abs()),
+            dual: self.dual_residual(),
+            gap: (objective - dual_objective).abs()
+                / (1.0 + objective.abs() + dual_objective.abs()),
         };
-        Status { objective, dual_objective, residuals, mu: complementarity / self.order }
-    }
-
-    /// How far the multipliers, scaled to a dual objective of 1 without the objective c, are from excluding every x.
-    fn witness_residual(&self, status: &Status) -> f64 {
-        if self.feasible || status.dual_objective.is_nan() || status.dual_objective <= 0.0 {
-            return f64::INFINITY;
+        Status {
+            objective,
+            dual_objective,
+            residuals,
+            mu: complementarity / self.order,
         }
-        let residual = self.az.iter().fold(0.0, |m: f64, a| nan_max(m, a.abs()));
-        residual / status.dual_objective
     }
 
-    /// A direction of x without end: x itself, grown large.
-    fn ray(&self, status: &Status) -> Option<Vec<f64>> {
-        if status.objective.is_nan() || status.objective >= 0.0 || status.residuals.dual <= 1e-6 {
-            return None;
-        }
-        let far = -status.objective;
-        // F(x) − F(0) = S + R − C, and S is positive definite.
-        let defect = self.blocks.iter().zip(&self.constant_norms).map(|(b, c)| (norm(&b.residual) + c) / far);
-        (defect.fold(0.0, nan_max) <= CERTIFICATE).then(|| self.x.iter().map(|x| x / far).collect())
-    }
-
-    fn interrupted(&self, iterations: usize, since_progress: usize, started: Instant) -> Option<InaccurateReason> {
-        let cancelled = |flag: &std::sync::Arc<std::sync::atomic::AtomicBool>| flag.load(Ordering::Relaxed);
+    fn interrupted(&self, iterations: usize, started: Instant) -> Option<InaccurateReason> {
+        let cancelled =
+            |flag: &std::sync::Arc<std::sync::atomic::AtomicBool>| flag.load(Ordering::Relaxed);
         if self.options.cancel.as_ref().is_some_and(cancelled) {
             return Some(InaccurateReason::Cancelled);
         }
-        if self.options.time_limit.is_some_and(|limit| started.elapsed() >= limit) {
+        if self
+            .options
+            .time_limit
+            .is_some_and(|limit| started.elapsed() >= limit)
+        {
             return Some(InaccurateReason::TimeLimit);
         }
-        if iterations > self.options.max_iterations {
-            return Some(InaccurateReason::IterationLimit);
-        }
-        (since_progress > 15).then_some(InaccurateReason::Stalled)
+        (iterations > self.options.max_iterations).then_some(InaccurateReason::IterationLimit)
     }
 
     /// One predictor-corrector step: (centring, primal step, dual step), or `None` when no step can be taken.
     fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
         let unknowns = self.x.len();
         self.schur.matrix.fill(0.0);
-        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.invert(&mut self.scratch);
-            let BlockState { s_inverse, z, operator, .. } = state;
+            let BlockState {
+                s_inverse,
+                z,
+                operator,
+                ..
+            } = state;
             block.schur(s_inverse, z, &mut self.schur.matrix, unknowns, operator);
         }
         if !self.schur.factorize() {
             return None;
         }
         let feasible = self.feasible;
-        self.blocks.iter_mut().for_each(|state| state.begin_predictor(feasible));
+        self.blocks
+            .iter_mut()
+            .for_each(|state| state.begin_predictor(feasible));
         self.direction();
         let (primal, dual) = self.longest_steps(0.3);
         let (primal, dual) = (primal.min(1.0), dual.min(1.0));
-        let reached: f64 = self.blocks.iter().map(|b| b.complementarity(primal, dual)).sum::<f64>() / self.order;
+        let reached: f64 = self
+            .blocks
+            .iter()
+            .map(|b| b.complementarity(primal, dual))
+            .sum::<f64>()
+            / self.order;
         let ratio = (reached / status.mu).clamp(0.0, 1.0);
         let exponent = (3.0 * primal.min(dual).powi(2)).max(1.0);
         let sigma = ratio.powf(exponent).clamp(1e-6, 1.0);
-        self.blocks.iter_mut().for_each(|state| state.begin_corrector(sigma * status.mu));
+        self.blocks
+            .iter_mut()
+            .for_each(|state| state.begin_corrector(sigma * status.mu));
         self.direction();
         self.refine();
         let fraction = 0.9 + 0.09 * primal.min(dual);
@@ -294,19 +369,24 @@ impl<'a> Iteration<'a> {
         let (primal, dual) = ((fraction * primal).min(1.0), (fraction * dual).min(1.0));
         let primal = self.safeguard(primal, BlockState::try_primal)?;
         let dual = self.safeguard(dual, BlockState::try_dual)?;
-        self.blocks.iter_mut().for_each(|state| state.advance(primal, dual));
+        self.blocks
+            .iter_mut()
+            .for_each(|state| state.advance(primal, dual));
         crate::dense::axpy(primal, &self.dx, &mut self.x);
         Some((sigma, primal, dual))
     }
 
     /// dx, dS and dZ for the right side that the blocks hold.
     fn direction(&mut self) {
-        self.right_side.iter_mut().zip(&self.program.objective).for_each(|(r, c)| *r = -c);
-        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+        self.right_side
+            .iter_mut()
+            .zip(self.objective)
+            .for_each(|(r, c)| *r = -c);
+        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.add_right_side(block, &mut self.right_side);
         }
         self.schur.solve(&self.right_side, &mut self.dx);
-        for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.complete(block, &self.dx, self.feasible);
         }
     }
@@ -316,19 +396,23 @@ impl<'a> Iteration<'a> {
     fn refine(&mut self) {
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
-            self.right_side.copy_from_slice(&self.program.objective);
-            for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+            self.right_side.copy_from_slice(self.objective);
+            for (state, block) in self.blocks.iter_mut().zip(self.operators) {
                 state.subtract_dual(block, &mut self.right_side);
             }
-            let size = self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs())) / (1.0 + self.objective_norm);
-            if size.is_nan() || size <= 1e-3 * self.options.feasibility_tolerance || size > 0.3 * last {
+            let size = self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs()))
+                / (1.0 + self.objective_norm);
+            if size.is_nan()
+                || size <= 1e-3 * self.options.feasibility_tolerance
+                || size > 0.9 * last
+            {
                 return;
             }
             last = size;
             self.right_side.iter_mut().for_each(|r| *r = -*r);
             self.schur.solve(&self.right_side, &mut self.change);
             crate::dense::axpy(1.0, &self.change, &mut self.dx);
-            for (state, block) in self.blocks.iter_mut().zip(&self.program.blocks) {
+            for (state, block) in self.blocks.iter_mut().zip(self.operators) {
                 state.refine(block, &self.change);
             }
         }
@@ -344,12 +428,20 @@ impl<'a> Iteration<'a> {
     }
 
     /// Shortens a step until every block stays positive definite.
-    fn safeguard(&mut self, mut step: f64, attempt: fn(&mut BlockState, f64, &mut Scratch) -> bool) -> Option<f64> {
+    fn safeguard(
+        &mut self,
+        mut step: f64,
+        attempt: fn(&mut BlockState, f64, &mut Scratch) -> bool,
+    ) -> Option<f64> {
         for _ in 0..40 {
             if step < 1e-9 {
                 return None;
             }
-            if self.blocks.iter_mut().all(|state| attempt(state, step, &mut self.scratch)) {
+            if self
+                .blocks
+                .iter_mut()
+                .all(|state| attempt(state, step, &mut self.scratch))
+            {
                 return Some(step);
             }
             step *= 0.8;
@@ -360,5 +452,9 @@ impl<'a> Iteration<'a> {
 
 /// The larger one, or NaN when either is.
 fn nan_max(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+    if a.is_nan() || b.is_nan() {
+        f64::NAN
+    } else {
+        a.max(b)
+    }
 }

@@ -21,19 +21,39 @@ pub(crate) struct Lanczos {
 
 impl Lanczos {
     pub fn new(n: usize) -> Self {
-        Self { v: vec![0.0; n], sv: vec![0.0; n], sv_before: vec![0.0; n], w: vec![0.0; n], u: vec![0.0; n] }
+        Self {
+            v: vec![0.0; n],
+            sv: vec![0.0; n],
+            sv_before: vec![0.0; n],
+            w: vec![0.0; n],
+            u: vec![0.0; n],
+        }
     }
 
     /// A lower estimate, to the relative `accuracy`, of the largest α with `S + αD ⪰ 0`; infinite when the estimate finds no end.
     ///
     /// Given are S itself, its inverse and D, symmetric n × n.
-    pub fn step(&mut self, n: usize, s: &[f64], s_inverse: &[f64], d: &[f64], accuracy: f64) -> f64 {
-        let Self { v, sv, sv_before, w, u } = self;
+    pub fn step(
+        &mut self,
+        n: usize,
+        s: &[f64],
+        s_inverse: &[f64],
+        d: &[f64],
+        accuracy: f64,
+    ) -> f64 {
+        let Self {
+            v,
+            sv,
+            sv_before,
+            w,
+            u,
+        } = self;
         let (v, sv, sv_before) = (&mut v[..n], &mut sv[..n], &mut sv_before[..n]);
         let (w, u) = (&mut w[..n], &mut u[..n]);
         // A fixed start without pattern.
         for (i, v) in v.iter_mut().enumerate() {
-            *v = 1.0 + 0.5 * ((i * i + 3 * i + 1) % 7) as f64 / 7.0 - if i % 2 == 1 { 0.3 } else { 0.0 };
+            *v = 1.0 + 0.5 * ((i * i + 3 * i + 1) % 7) as f64 / 7.0
+                - if i % 2 == 1 { 0.3 } else { 0.0 };
         }
         apply(n, s, v, sv);
         let length = dot(v, sv).sqrt();
@@ -65,16 +85,27 @@ impl Lanczos {
                 // Some eigenvalue lies within `residual` of the Ritz value.
                 let residual = if k + 1 == n { 0.0 } else { beta * component };
                 smallest = value - residual;
-                if last || residual <= accuracy * value.abs() || (value > -1e-1 && value - residual > -0.5) {
+                if last
+                    || residual <= accuracy * value.abs()
+                    || (value > -1e-1 && value - residual > -0.5)
+                {
                     break;
                 }
             }
             sv_before.copy_from_slice(sv);
             let inverse = 1.0 / beta;
-            v.iter_mut().zip(u.iter()).for_each(|(v, u)| *v = u * inverse);
-            sv.iter_mut().zip(w.iter()).for_each(|(sv, w)| *sv = w * inverse);
+            v.iter_mut()
+                .zip(u.iter())
+                .for_each(|(v, u)| *v = u * inverse);
+            sv.iter_mut()
+                .zip(w.iter())
+                .for_each(|(sv, w)| *sv = w * inverse);
         }
-        if smallest < 0.0 { -1.0 / smallest } else { f64::INFINITY }
+        if smallest < 0.0 {
+            -1.0 / smallest
+        } else {
+            f64::INFINITY
+        }
     }
 }
 
@@ -87,7 +118,9 @@ fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> (f64, f64) {
         let right = if i + 1 < k { off[i].abs() } else { 0.0 };
         left + right
     };
-    let mut low = (0..k).map(|i| diagonal[i] - radius(i)).fold(f64::INFINITY, f64::min);
+    let mut low = (0..k)
+        .map(|i| diagonal[i] - radius(i))
+        .fold(f64::INFINITY, f64::min);
     let mut high = diagonal.iter().copied().fold(f64::INFINITY, f64::min);
     // Sturm: the pivots of T − λI are all positive exactly when λ is below the spectrum.
     let below = |lambda: f64| {
@@ -105,16 +138,28 @@ fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> (f64, f64) {
             break;
         }
         let middle = 0.5 * (low + high);
-        if below(middle) { low = middle } else { high = middle }
+        if below(middle) {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     // The eigenvector by its recurrence from the first component on.
     let (mut before, mut now, mut sum) = (0.0, 1.0, 1.0);
     for i in 0..k - 1 {
         let previous = if i > 0 { off[i - 1] * before } else { 0.0 };
-        let next = if off[i] != 0.0 { ((low - diagonal[i]) * now - previous) / off[i] } else { 0.0 };
+        let next = if off[i] != 0.0 {
+            ((low - diagonal[i]) * now - previous) / off[i]
+        } else {
+            0.0
+        };
         (before, now) = (now, next);
         sum += now * now;
     }
-    let component = if sum.is_finite() { now.abs() / sum.sqrt() } else { 1.0 };
+    let component = if sum.is_finite() {
+        now.abs() / sum.sqrt()
+    } else {
+        1.0
+    };
     (low, component)
 }

@@ -70,7 +70,9 @@ mod sparse;
 mod start;
 mod verification;
 
-pub use answer::{Answer, BlockReport, InaccurateReason, IterationLog, Outcome, Ray, Residuals, Witness};
+pub use answer::{
+    Answer, BlockReport, InaccurateReason, IterationLog, Outcome, Ray, Residuals, Witness,
+};
 pub use error::Error;
 pub use expression::Expr;
 pub use options::Options;

@@ -26,9 +26,17 @@ impl Layout {
         let mut starts = Vec::with_capacity(unknowns.len());
         for unknown in unknowns {
             starts.push(len);
-            len += if unknown.symmetric { unknown.rows * (unknown.rows + 1) / 2 } else { unknown.rows * unknown.cols };
+            len += if unknown.symmetric {
+                unknown.rows * (unknown.rows + 1) / 2
+            } else {
+                unknown.rows * unknown.cols
+            };
         }
-        Self { unknowns: unknowns.to_vec(), starts, len }
+        Self {
+            unknowns: unknowns.to_vec(),
+            starts,
+            len,
+        }
     }
 
     /// Number of scalar unknowns.
@@ -50,7 +58,10 @@ impl Layout {
     /// The unknowns as matrices.
     pub fn matrices(&self, x: &[f64]) -> Vec<Mat<f64>> {
         let entry = |unknown: Unknown| move |i, j| x[self.position(unknown, i, j)];
-        self.unknowns.iter().map(|&u| Mat::from_fn(u.rows, u.cols, entry(u))).collect()
+        self.unknowns
+            .iter()
+            .map(|&u| Mat::from_fn(u.rows, u.cols, entry(u)))
+            .collect()
     }
 
     /// From a gradient with respect to each matrix to the gradient with respect to x: the entries (i, j) and (j, i) of
@@ -100,9 +111,16 @@ pub(crate) fn lower(
         check_expression(problem, &place, &inequality.expression)?;
         check_symmetric(inequality, &layout)?;
         let scale = verification::largest_entry(&inequality.expression.constant);
-        let margin = inequality.margin.unwrap_or(options.margin * if scale > 0.0 { scale } else { 1.0 });
+        let margin = inequality
+            .margin
+            .unwrap_or(options.margin * if scale > 0.0 { scale } else { 1.0 });
         if !margin.is_finite() {
-            return Err(Error::NotFinite { place: format!("the margin of {place}"), row: 0, column: 0, value: margin });
+            return Err(Error::NotFinite {
+                place: format!("the margin of {place}"),
+                row: 0,
+                column: 0,
+                value: margin,
+            });
         }
         blocks.push(lower_block(&inequality.expression, margin, &layout));
         margins.push(margin);
@@ -111,19 +129,34 @@ pub(crate) fn lower(
     if let Some((sense, expression)) = objective {
         check_expression(problem, "the objective", expression)?;
         if (expression.nrows(), expression.ncols()) != (1, 1) {
-            return Err(Error::ObjectiveNotScalar { rows: expression.nrows(), columns: expression.ncols() });
+            return Err(Error::ObjectiveNotScalar {
+                rows: expression.nrows(),
+                columns: expression.ncols(),
+            });
         }
         sign = if *sense == Sense::Minimize { 1.0 } else { -1.0 };
         objective_constant = expression.constant[(0, 0)];
-        let mut gradients: Vec<Mat<f64>> = unknowns.iter().map(|u| Mat::zeros(u.rows, u.cols)).collect();
+        let mut gradients: Vec<Mat<f64>> = unknowns
+            .iter()
+            .map(|u| Mat::zeros(u.rows, u.cols))
+            .collect();
         let one = Mat::from_fn(1, 1, |_, _| sign);
         for term in expression.terms.iter() {
             gradients[term.unknown.index] += verification::gradient(term, &one);
         }
         c = layout.scalars(&gradients);
     }
-    let program = Program { objective: c, blocks };
-    Ok(Lowered { program, layout, margins, objective_constant, sign })
+    let program = Program {
+        objective: c,
+        blocks,
+    };
+    Ok(Lowered {
+        program,
+        layout,
+        margins,
+        objective_constant,
+        sign,
+    })
 }
 
 /// The Schur complement of this many unknowns takes 3.2 GB.
@@ -131,14 +164,23 @@ const MOST_UNKNOWNS: usize = 20_000;
 
 pub(crate) fn check_size(unknowns: usize) -> Result<(), Error> {
     if unknowns > MOST_UNKNOWNS {
-        return Err(Error::TooLarge { unknowns, allowed: MOST_UNKNOWNS });
+        return Err(Error::TooLarge {
+            unknowns,
+            allowed: MOST_UNKNOWNS,
+        });
     }
     Ok(())
 }
 
 fn check_expression(problem: u64, place: &str, expression: &Expr) -> Result<(), Error> {
-    if expression.terms.iter().any(|term| term.unknown.problem != problem) {
-        return Err(Error::ForeignUnknown { place: place.to_owned() });
+    if expression
+        .terms
+        .iter()
+        .any(|term| term.unknown.problem != problem)
+    {
+        return Err(Error::ForeignUnknown {
+            place: place.to_owned(),
+        });
     }
     let parts = expression.terms.iter().flat_map(|term| match &term.shape {
         Shape::Product { left, right, .. } => [left, right],
@@ -149,7 +191,12 @@ fn check_expression(problem: u64, place: &str, expression: &Expr) -> Result<(), 
             for row in 0..matrix.nrows() {
                 let value = matrix[(row, column)];
                 if !value.is_finite() {
-                    return Err(Error::NotFinite { place: place.to_owned(), row, column, value });
+                    return Err(Error::NotFinite {
+                        place: place.to_owned(),
+                        row,
+                        column,
+                        value,
+                    });
                 }
             }
         }
@@ -163,7 +210,11 @@ fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error
     let expression = &inequality.expression;
     let (rows, columns) = (expression.nrows(), expression.ncols());
     if rows != columns {
-        return Err(Error::NotSquare { name: inequality.name.clone(), rows, columns });
+        return Err(Error::NotSquare {
+            name: inequality.name.clone(),
+            rows,
+            columns,
+        });
     }
     let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
     for probe in 0..3 {
@@ -172,7 +223,11 @@ fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error
                 seed ^= seed << 13;
                 seed ^= seed >> 7;
                 seed ^= seed << 17;
-                if probe == 0 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5 }
+                if probe == 0 {
+                    0.0
+                } else {
+                    (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+                }
             })
             .collect();
         let values = layout.matrices(&x);
@@ -217,13 +272,18 @@ fn lower_block(expression: &Expr, margin: f64, layout: &Layout) -> Block {
     let mut products = Vec::new();
     for term in expression.terms.iter() {
         match &term.shape {
-            Shape::Scaled { weights, matrix } => scaled_entries(term.unknown, weights, matrix, layout, &mut entries),
+            Shape::Scaled { weights, matrix } => {
+                scaled_entries(term.unknown, weights, matrix, layout, &mut entries)
+            }
             Shape::Product { .. } => products.push(Product::of(term)),
         }
     }
     let stacks = stack(products, layout);
     if n == 1 {
-        let mut row: Vec<(usize, f64)> = entries.iter().map(|e: &Entry| (e.unknown, e.value)).collect();
+        let mut row: Vec<(usize, f64)> = entries
+            .iter()
+            .map(|e: &Entry| (e.unknown, e.value))
+            .collect();
         for stack in &stacks {
             let k = stack.v.len();
             for (r, u) in stack.u.iter().enumerate() {
@@ -234,10 +294,21 @@ fn lower_block(expression: &Expr, margin: f64, layout: &Layout) -> Block {
         }
         return Block::Diagonal(DiagonalBlock::new(constant, vec![row]));
     }
-    Block::Dense(DenseBlock { size: n, constant, factored: Factored::new(n, stacks), sparse: Sparse::new(n, entries) })
+    Block::Dense(DenseBlock {
+        size: n,
+        constant,
+        factored: Factored::new(n, stacks),
+        sparse: Sparse::new(n, entries),
+    })
 }
 
-fn scaled_entries(unknown: Unknown, weights: &Mat<f64>, matrix: &Mat<f64>, layout: &Layout, entries: &mut Vec<Entry>) {
+fn scaled_entries(
+    unknown: Unknown,
+    weights: &Mat<f64>,
+    matrix: &Mat<f64>,
+    layout: &Layout,
+    entries: &mut Vec<Entry>,
+) {
     for i in 0..weights.nrows() {
         for j in 0..weights.ncols() {
             let weight = weights[(i, j)];
@@ -248,7 +319,12 @@ fn scaled_entries(unknown: Unknown, weights: &Mat<f64>, matrix: &Mat<f64>, layou
                 for row in column..matrix.nrows() {
                     let value = 0.5 * weight * (matrix[(row, column)] + matrix[(column, row)]);
                     if value != 0.0 {
-                        entries.push(Entry { unknown: layout.position(unknown, i, j), row, column, value });
+                        entries.push(Entry {
+                            unknown: layout.position(unknown, i, j),
+                            row,
+                            column,
+                            value,
+                        });
                     }
                 }
             }
@@ -266,7 +342,12 @@ struct Product {
 
 impl Product {
     fn of(term: &Term) -> Self {
-        let Shape::Product { left, transposed, right } = &term.shape else {
+        let Shape::Product {
+            left,
+            transposed,
+            right,
+        } = &term.shape
+        else {
             unreachable!("only products are lowered to products");
         };
         // U Xᵀ V and its transpose Vᵀ X Uᵀ have the same symmetric part.
@@ -275,7 +356,12 @@ impl Product {
         } else {
             (left.clone(), right.transpose().to_owned())
         };
-        Self { unknown: term.unknown, u, v }.normalized()
+        Self {
+            unknown: term.unknown,
+            u,
+            v,
+        }
+        .normalized()
     }
 
     /// Moves sign and power of two of V's first entry to U, exactly, so that equal factors compare equal.
@@ -285,7 +371,9 @@ impl Product {
             .map(|(i, j)| self.v[(i, j)])
             .find(|&v| v != 0.0);
         if let Some(first) = first {
-            let scale = 2.0_f64.powi(first.abs().log2().floor().clamp(-900.0, 900.0) as i32).copysign(first);
+            let scale = 2.0_f64
+                .powi(first.abs().log2().floor().clamp(-900.0, 900.0) as i32)
+                .copysign(first);
             self.u *= faer::Scale(scale);
             self.v *= faer::Scale(1.0 / scale);
         }
@@ -294,9 +382,14 @@ impl Product {
 
     /// The same term with the factors exchanged, which a symmetric unknown permits.
     fn flipped(&self) -> Option<Self> {
-        self.unknown
-            .symmetric
-            .then(|| Self { unknown: self.unknown, u: self.v.clone(), v: self.u.clone() }.normalized())
+        self.unknown.symmetric.then(|| {
+            Self {
+                unknown: self.unknown,
+                u: self.v.clone(),
+                v: self.u.clone(),
+            }
+            .normalized()
+        })
     }
 
     /// The term written with the given right factor, when it can be.
@@ -327,11 +420,19 @@ fn stack(products: Vec<Product>, layout: &Layout) -> Vec<Stack> {
         }
         left = rest;
         let columns = nonzero_columns(&v);
-        let mut stack = Stack { u: Vec::new(), v: columns.iter().map(|&j| column(&v, j, 1.0)).collect(), positions: vec![] };
+        let mut stack = Stack {
+            u: Vec::new(),
+            v: columns.iter().map(|&j| column(&v, j, 1.0)).collect(),
+            positions: vec![],
+        };
         for product in &merged {
             for i in nonzero_columns(&product.u) {
                 stack.u.push(column(&product.u, i, 0.5));
-                stack.positions.extend(columns.iter().map(|&j| layout.position(product.unknown, i, j)));
+                stack.positions.extend(
+                    columns
+                        .iter()
+                        .map(|&j| layout.position(product.unknown, i, j)),
+                );
             }
         }
         if !stack.u.is_empty() && !stack.v.is_empty() {
@@ -354,11 +455,14 @@ fn merge_left_factors(products: Vec<Product>) -> Vec<Product> {
     };
     let prefers_left: Vec<bool> = products
         .iter()
-        .map(|p| !p.unknown.symmetric && distinct(p.unknown, |p| &p.u) < distinct(p.unknown, |p| &p.v))
+        .map(|p| {
+            !p.unknown.symmetric && distinct(p.unknown, |p| &p.u) < distinct(p.unknown, |p| &p.v)
+        })
         .collect();
     let mut merged: Vec<Product> = Vec::new();
     for (product, prefers_left) in products.into_iter().zip(prefers_left) {
-        let same = |m: &&mut Product| prefers_left && m.unknown == product.unknown && m.u == product.u;
+        let same =
+            |m: &&mut Product| prefers_left && m.unknown == product.unknown && m.u == product.u;
         match merged.iter_mut().find(same) {
             Some(m) => m.v += &product.v,
             None => merged.push(product),
@@ -388,7 +492,9 @@ fn most_frequent_right_factor(products: &[Product]) -> Mat<f64> {
 }
 
 fn nonzero_columns(m: &Mat<f64>) -> Vec<usize> {
-    (0..m.ncols()).filter(|&j| (0..m.nrows()).any(|i| m[(i, j)] != 0.0)).collect()
+    (0..m.ncols())
+        .filter(|&j| (0..m.nrows()).any(|i| m[(i, j)] != 0.0))
+        .collect()
 }
 
 fn column(m: &Mat<f64>, j: usize, factor: f64) -> Vec<f64> {

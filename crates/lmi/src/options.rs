@@ -15,7 +15,7 @@ pub struct Options {
     /// gap of at most 1e-7, never for a larger one.
     pub gap_tolerance: f64,
     /// Relative residual of the equations of the problem and its dual for
-    /// [`Outcome::Solved`](crate::Outcome::Solved) (default 1e-8).
+    /// [`Outcome::Solved`](crate::Outcome::Solved) (default 1e-7).
     pub feasibility_tolerance: f64,
     /// Default margin of strict inequalities, relative to the block's scale (default 1e-12).
     ///
@@ -33,7 +33,7 @@ impl Default for Options {
         Self {
             max_iterations: 150,
             gap_tolerance: 1e-9,
-            feasibility_tolerance: 1e-8,
+            feasibility_tolerance: 1e-7,
             margin: 1e-12,
             cancel: None,
             time_limit: None,
@@ -47,7 +47,11 @@ impl Options {
             if value > 0.0 && value < 1.0 {
                 return Ok(());
             }
-            Err(crate::Error::BadOption { option, value, allowed: "a tolerance lies between 0 and 1" })
+            Err(crate::Error::BadOption {
+                option,
+                value,
+                allowed: "a tolerance lies between 0 and 1",
+            })
         };
         tolerance("gap_tolerance", self.gap_tolerance)?;
         tolerance("feasibility_tolerance", self.feasibility_tolerance)?;

@@ -2,9 +2,12 @@
 //! definite when the coefficient matrices are linearly independent.
 
 use crate::dense::{Scratch, axpy, cholesky, dot, norm};
+use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::{Conj, MatMut, MatRef, Par};
-use faer::dyn_stack::{MemBuffer, MemStack};
+
+/// Rounds of refinement at most.
+const ROUNDS: usize = 4;
 
 /// M with its factorisation.
 pub(crate) struct Schur {
@@ -59,7 +62,9 @@ impl Schur {
         loop {
             for j in 0..n {
                 let scale = self.scale[j];
-                let columns = self.factor[j * n + j..(j + 1) * n].iter_mut().zip(&self.matrix[j * n + j..(j + 1) * n]);
+                let columns = self.factor[j * n + j..(j + 1) * n]
+                    .iter_mut()
+                    .zip(&self.matrix[j * n + j..(j + 1) * n]);
                 for ((factor, entry), other) in columns.zip(&self.scale[j..]) {
                     *factor = entry * scale * other;
                 }
@@ -68,24 +73,31 @@ impl Schur {
             if cholesky(n, &mut self.factor, &mut self.scratch) {
                 return true;
             }
-            self.regularization = if self.regularization == 0.0 { 1e-15 } else { self.regularization * 30.0 };
+            self.regularization = if self.regularization == 0.0 {
+                1e-16
+            } else {
+                self.regularization * 4.0
+            };
             if self.regularization > 1e-3 {
                 return false;
             }
         }
     }
 
-    /// Solves M x = r with iterative refinement against M itself.
+    /// Solves M x = r by the factor and iterative refinement against M itself.
+    ///
+    /// Directions in which M is small against its own rounding errors are left alone: a solver that insists on them
+    /// (conjugate gradients, say) follows noise.
     pub fn solve(&mut self, r: &[f64], x: &mut [f64]) {
         x.fill(0.0);
         self.residual.copy_from_slice(r);
-        let mut last = norm(r);
-        let target = 1e-14 * last;
-        for round in 0..4 {
+        let target = 1e-14 * norm(r);
+        let mut last = f64::INFINITY;
+        for round in 0..ROUNDS {
             self.correction.copy_from_slice(&self.residual);
             self.solve_factored();
             axpy(1.0, &self.correction, x);
-            self.compute_residual(r, x);
+            self.update_residual(r, x);
             let size = norm(&self.residual);
             if size.is_nan() || (round > 0 && size >= last) {
                 axpy(-1.0, &self.correction, x);
@@ -100,7 +112,10 @@ impl Schur {
 
     fn solve_factored(&mut self) {
         let n = self.n;
-        self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
+        self.correction
+            .iter_mut()
+            .zip(&self.scale)
+            .for_each(|(c, s)| *c *= s);
         llt::solve::solve_in_place_with_conj(
             MatRef::from_column_major_slice(&self.factor, n, n),
             Conj::No,
@@ -108,11 +123,14 @@ impl Schur {
             Par::Seq,
             MemStack::new(&mut self.buffer),
         );
-        self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
+        self.correction
+            .iter_mut()
+            .zip(&self.scale)
+            .for_each(|(c, s)| *c *= s);
     }
 
     /// residual = r − M x from the lower triangle.
-    fn compute_residual(&mut self, r: &[f64], x: &[f64]) {
+    fn update_residual(&mut self, r: &[f64], x: &[f64]) {
         let n = self.n;
         self.residual.copy_from_slice(r);
         for j in 0..n {

@@ -74,7 +74,13 @@ impl Sparse {
                 }
             }
             let unknown = group[0].unknown;
-            coefficients.push(Coefficient { unknown, entries: merged, support, full, whole: false });
+            coefficients.push(Coefficient {
+                unknown,
+                entries: merged,
+                support,
+                full,
+                whole: false,
+            });
         }
         coefficients.sort_by_key(|c| std::cmp::Reverse(c.entries.len()));
         let mut remaining: usize = coefficients.iter().map(|c| c.entries.len()).sum();
@@ -95,7 +101,11 @@ impl Sparse {
             return SparseScratch::default();
         }
         let square = self.n * self.n;
-        SparseScratch { fz: vec![0.0; square], p_rows: vec![0.0; square], h: vec![0.0; square] }
+        SparseScratch {
+            fz: vec![0.0; square],
+            p_rows: vec![0.0; square],
+            h: vec![0.0; square],
+        }
     }
 
     /// out ← out + F(x) − F(0).
@@ -117,7 +127,13 @@ impl Sparse {
             let inner: f64 = c
                 .entries
                 .iter()
-                .map(|&(i, j, value)| if i == j { value * h[i + j * self.n] } else { 2.0 * value * h[i + j * self.n] })
+                .map(|&(i, j, value)| {
+                    if i == j {
+                        value * h[i + j * self.n]
+                    } else {
+                        2.0 * value * h[i + j * self.n]
+                    }
+                })
                 .sum();
             out[c.unknown] += factor * inner;
         }
@@ -126,8 +142,11 @@ impl Sparse {
     /// out_i ← max(out_i, ‖F_i‖_F).
     pub fn norms(&self, out: &mut [f64]) {
         for c in &self.coefficients {
-            let square: f64 =
-                c.entries.iter().map(|&(i, j, v)| if i == j { v * v } else { 2.0 * v * v }).sum();
+            let square: f64 = c
+                .entries
+                .iter()
+                .map(|&(i, j, v)| if i == j { v * v } else { 2.0 * v * v })
+                .sum();
             out[c.unknown] = out[c.unknown].max(square.sqrt());
         }
     }
@@ -180,7 +199,13 @@ impl Sparse {
                 let sum: f64 = other
                     .entries
                     .iter()
-                    .map(|&(i, j, value)| if i == j { value * inner(i, i) } else { value * (inner(i, j) + inner(j, i)) })
+                    .map(|&(i, j, value)| {
+                        if i == j {
+                            value * inner(i, i)
+                        } else {
+                            value * (inner(i, j) + inner(j, i))
+                        }
+                    })
                     .sum();
                 let (low, high) = (c.unknown.min(other.unknown), c.unknown.max(other.unknown));
                 m[high + low * unknowns] += sum;

@@ -2,6 +2,7 @@
 
 use crate::designs;
 use crate::failure::Failure;
+use crate::output::print;
 use crate::scenario::read_text;
 use clap::Args;
 use lpv::certificate::{Claim, Verdict, check};
@@ -35,19 +36,23 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     let claims = check(&design, &*plant);
     let verdict = designs::worst(&claims);
     if arguments.json {
-        let certificate = Certificate { design: &design.name, verdict, claims: &claims };
-        let json = serde_json::to_string_pretty(&certificate).map_err(|error| Failure::serialisation(&error))?;
-        println!("{json}");
+        let certificate = Certificate {
+            design: &design.name,
+            verdict,
+            claims: &claims,
+        };
+        let json = serde_json::to_string_pretty(&certificate)
+            .map_err(|error| Failure::serialisation(&error))?;
+        print(&json)?;
     } else {
-        println!("{}: {}", design.name, verdict.word());
-        for claim in &claims {
-            println!("  {}: {} ({})", claim.verdict.word(), claim.claim, claim.detail);
-        }
+        print(&designs::text(&design.name, &claims))?;
     }
     match verdict {
         Verdict::Proved | Verdict::Numerical => Ok(()),
-        Verdict::Refuted | Verdict::Undecided => {
-            Err(Failure::NotCertified(format!("\"{}\" is {}", design.name, verdict.word())))
-        }
+        Verdict::Refuted | Verdict::Undecided => Err(Failure::NotCertified(format!(
+            "\"{}\" is {}",
+            design.name,
+            verdict.word()
+        ))),
     }
 }

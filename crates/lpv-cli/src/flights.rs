@@ -1,6 +1,5 @@
 //! Flights of a scenario: simulation of each controller, and what its design says about each set-point step.
 
-use crate::failure::Failure;
 use crate::scenario::{ControllerPlan, Scenario};
 use lpv::certificate::{CertifiedStep, Claim, Verdict, certified_step};
 use lpv::model::linearize;
@@ -35,7 +34,7 @@ impl Flown {
 }
 
 /// Fly every controller with its design, in parallel.
-pub fn fly_all(scenario: &Scenario, designs: &[Design]) -> Result<Vec<Flown>, Failure> {
+pub fn fly_all(scenario: &Scenario, designs: &[Design]) -> Vec<Flown> {
     let bar = crate::progress::bar("fly", designs.len());
     let flights = (scenario.controllers.par_iter().zip(designs))
         .map(|(plan, design)| {
@@ -48,7 +47,7 @@ pub fn fly_all(scenario: &Scenario, designs: &[Design]) -> Result<Vec<Flown>, Fa
     flights
 }
 
-fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design) -> Result<Flown, Failure> {
+fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design) -> Flown {
     let started = Instant::now();
     let simulation = Simulation {
         plant: &*scenario.plant,
@@ -67,9 +66,15 @@ fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design) -> Result<Fl
     let flight = simulation.fly(&design.controller);
     let performance = performance(scenario.plant.description(), &scenario.reference, &flight);
     let seconds = started.elapsed().as_secs_f64();
-    let (steps, mut claims) = step_claims(scenario, design, &flight)?;
+    let (steps, mut claims) = step_claims(scenario, design, &flight);
     claims.extend(rate_claim(scenario, &performance));
-    Ok(Flown { flight, performance, steps, claims, seconds })
+    Flown {
+        flight,
+        performance,
+        steps,
+        claims,
+        seconds,
+    }
 }
 
 /// Whether each set-point step starts inside the certified set, and if not, the γ that would cover it.
@@ -77,18 +82,27 @@ fn step_claims(
     scenario: &Scenario,
     design: &Design,
     flight: &Flight,
-) -> Result<(Vec<CertifiedStep>, Vec<Claim>), Failure> {
+) -> (Vec<CertifiedStep>, Vec<Claim>) {
     let description = scenario.plant.description();
     let scheduling = description.scheduling.as_ref();
     let mut error = vec![0.0; description.states.len()];
     let (mut steps, mut claims) = (Vec::new(), Vec::new());
     for (k, set_point) in scenario.reference.set_points().iter().enumerate() {
-        let sample = flight.trajectory.time_s.partition_point(|&t| t < set_point.time_s - 1e-9);
-        let Some(state) = flight.trajectory.states.get(sample) else { break };
+        let sample = flight
+            .trajectory
+            .time_s
+            .partition_point(|&t| t < set_point.time_s - 1e-9);
+        let Some(state) = flight.trajectory.states.get(sample) else {
+            break;
+        };
         description.state_error(state, &scenario.reference.at(set_point.time_s), &mut error);
         let rho = scheduling.map_or(0.0, |scheduling| state[scheduling.state]);
         let step = certified_step(design, scheduling, rho, &error);
-        let claim = format!("step {} at t = {} s starts inside the certified set", k + 1, set_point.time_s);
+        let claim = format!(
+            "step {} at t = {} s starts inside the certified set",
+            k + 1,
+            set_point.time_s
+        );
         let bound = format!("eᵀPe = {:.4}", step.bound);
         claims.push(match step.level {
             None => Claim {
@@ -99,34 +113,47 @@ fn step_claims(
             },
             Some(level) => {
                 let inside = step.is_inside();
-                let cover = if inside { String::new() } else { cover(scenario, design, rho, &error, level)? };
+                let cover = if inside {
+                    String::new()
+                } else {
+                    cover(scenario, design, rho, &error, level)
+                };
                 Claim {
                     claim,
-                    verdict: if inside { Verdict::Numerical } else { Verdict::Undecided },
+                    verdict: if inside {
+                        Verdict::Numerical
+                    } else {
+                        Verdict::Undecided
+                    },
                     margin: level - step.bound,
-                    detail: format!("{bound} {} level {level:.4}{cover}", if inside { "≤" } else { ">" }),
+                    detail: format!(
+                        "{bound} {} level {level:.4}{cover}",
+                        if inside { "≤" } else { ">" }
+                    ),
                 }
             }
         });
         steps.push(step);
     }
-    Ok((steps, claims))
+    (steps, claims)
 }
 
-/// Which γ would cover the step.
-fn cover(scenario: &Scenario, design: &Design, rho: f64, error: &[f64], level: f64) -> Result<String, Failure> {
+/// Which γ would cover the step. It is advice: a trial design that fails takes nothing from the flight.
+fn cover(scenario: &Scenario, design: &Design, rho: f64, error: &[f64], level: f64) -> String {
     let controller = &design.controller;
-    let Some(sigma) = controller.limits.symmetric_bound(&controller.operating_input) else {
-        return Ok(String::new());
+    let Some(sigma) = controller
+        .limits
+        .symmetric_bound(&controller.operating_input)
+    else {
+        return String::new();
     };
     let from = design.method.gamma().unwrap_or(level);
     let model = linearize(&*scenario.plant, rho);
-    let gamma = covering_level(&model, &design.weights, &sigma, error, from)
-        .map_err(|source| Failure::Synthesis { controller: design.name.clone(), source })?;
-    Ok(match gamma {
-        Some(gamma) => format!("; SLPVQR with γ = {gamma:.4} would cover it"),
-        None => "; no γ up to 1e6 covers it".into(),
-    })
+    match covering_level(&model, &design.weights, &sigma, error, from) {
+        Ok(Some(gamma)) => format!("; SLPVQR with γ = {gamma:.4} would cover it"),
+        Ok(None) => "; no γ up to 1e6 covers it".into(),
+        Err(error) => format!("; which γ would cover it is not known: {error}"),
+    }
 }
 
 /// A frozen design claims nothing while its parameter moves.
@@ -135,13 +162,23 @@ fn rate_claim(scenario: &Scenario, performance: &Performance) -> Option<Claim> {
     let rate = performance.peak_parameter_rate?;
     let at_rest = rate <= REST_RATE;
     Some(Claim {
-        claim: format!("{} rests during the flight, as the frozen design assumes", scheduling.parameter),
-        verdict: if at_rest { Verdict::Numerical } else { Verdict::Undecided },
+        claim: format!(
+            "{} rests during the flight, as the frozen design assumes",
+            scheduling.parameter
+        ),
+        verdict: if at_rest {
+            Verdict::Numerical
+        } else {
+            Verdict::Undecided
+        },
         margin: -rate,
         detail: if at_rest {
             "the bound applies".into()
         } else {
-            format!("it moves at up to {rate:.3} {}/s: the bound holds for a parameter at rest only", scheduling.unit)
+            format!(
+                "it moves at up to {rate:.3} {}/s: the bound holds for a parameter at rest only",
+                scheduling.unit
+            )
         },
     })
 }

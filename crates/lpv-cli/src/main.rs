@@ -2,7 +2,7 @@
 //!
 //! Each subcommand is a file; what several share is beside them:
 //! `scenario` reads TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
-//! `table` prints them, `folder` keeps results whole, `failure` is every way to end that is not success.
+//! `table` lays them out, `output` prints, `folder` keeps results whole, `failure` is every way to end that is not success.
 
 mod certify;
 mod design;
@@ -10,6 +10,7 @@ mod designs;
 mod failure;
 mod flights;
 mod folder;
+mod output;
 mod progress;
 mod record;
 mod report;
@@ -19,6 +20,7 @@ mod simulate;
 mod table;
 
 use clap::{Parser, Subcommand};
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Gain-scheduled control of nonlinear plants with saturating actuators, with a guarantee that is checked.
@@ -53,7 +55,8 @@ fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("lpv: {failure}");
+            // nobody is left to tell when standard error is gone too; the exit code still says it
+            let _ = writeln!(std::io::stderr(), "lpv: {failure}");
             ExitCode::from(failure.exit_code())
         }
     }

@@ -4,6 +4,7 @@ use crate::designs::{self, CheckedDesign};
 use crate::failure::Failure;
 use crate::flights;
 use crate::folder::ResultFolder;
+use crate::output::print;
 use crate::record::{RunRecord, trajectory_csv, trajectory_file_name};
 use crate::scenario::Scenario;
 use crate::{report, table};
@@ -17,7 +18,7 @@ pub struct RunArguments {
     /// Scenario file
     scenario: PathBuf,
     /// Folder for the results [default: out/<name of the scenario>]
-    #[arg(long)]
+    #[arg(long, short)]
     out: Option<PathBuf>,
     /// Replace an earlier result
     #[arg(long)]
@@ -31,27 +32,45 @@ pub struct RunArguments {
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let scenario = Scenario::read(&arguments.scenario)?;
-    let folder = ResultFolder::begin(&scenario.result_folder(arguments.out.as_deref()), arguments.force)?;
+    let folder = ResultFolder::begin(
+        &scenario.result_folder(arguments.out.as_deref()),
+        arguments.force,
+    )?;
     let checked = designs::design_all(&scenario)?;
-    let plain: Vec<_> = checked.iter().map(|checked| checked.design.clone()).collect();
-    let flown = flights::fly_all(&scenario, &plain)?;
+    let plain: Vec<_> = checked
+        .iter()
+        .map(|checked| checked.design.clone())
+        .collect();
+    let flown = flights::fly_all(&scenario, &plain);
 
     for ((plan, checked), flown) in scenario.controllers.iter().zip(&checked).zip(&flown) {
         let name = &plan.request.name;
-        folder.write(&designs::file_name(name), &designs::to_json(&checked.design)?)?;
-        folder.write(&trajectory_file_name(name), trajectory_csv(&scenario, flown).as_bytes())?;
+        folder.write(
+            &designs::file_name(name),
+            &designs::to_json(&checked.design)?,
+        )?;
+        folder.write(
+            &trajectory_file_name(name),
+            trajectory_csv(&scenario, flown).as_bytes(),
+        )?;
     }
-    folder.write("report.html", report::html(&scenario, &checked, &flown)?.as_bytes())?;
+    folder.write(
+        "report.html",
+        report::html(&scenario, &checked, &flown)?.as_bytes(),
+    )?;
     let seconds = started.elapsed().as_secs_f64();
     let record = RunRecord::new(&scenario, &checked, &flown, seconds).to_json()?;
     folder.write("run.json", record.as_bytes())?;
     let place = folder.finish()?;
 
     if arguments.json {
-        print!("{record}");
+        print(&record)?;
     } else {
-        println!("{}", table::comparison(&scenario, &checked, &flown));
-        println!("{} in {seconds:.1} s", place.join("report.html").display());
+        print(&format!(
+            "{}\n{} in {seconds:.1} s",
+            table::comparison(&scenario, &checked, &flown),
+            place.join("report.html").display()
+        ))?;
     }
     required_verdicts(&scenario, &checked)
 }
@@ -62,9 +81,18 @@ pub fn required_verdicts(scenario: &Scenario, checked: &[CheckedDesign]) -> Resu
         .filter_map(|(plan, checked)| {
             let (required, reached) = (plan.require?, checked.verdict());
             (reached < required).then(|| {
-                format!("\"{}\" is {}, required is {}", plan.request.name, reached.word(), required.word())
+                format!(
+                    "\"{}\" is {}, required is {}",
+                    plan.request.name,
+                    reached.word(),
+                    required.word()
+                )
             })
         })
         .collect();
-    if missed.is_empty() { Ok(()) } else { Err(Failure::NotCertified(missed.join("; "))) }
+    if missed.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::NotCertified(missed.join("; ")))
+    }
 }

@@ -13,7 +13,19 @@ use lpv::model::GridModel;
 use lpv::plant::{Description, Plant, PlantSpec};
 use lpv::sim::{Reference, SetPoint};
 use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method};
+use std::io::Read;
 use std::path::{Path, PathBuf};
+
+/// A state beyond this is called a divergence by the simulation, whatever its unit.
+const FARTHEST: f64 = 1e6;
+/// Numbers that the flights of a scenario may keep in memory: 0.8 GB.
+const MOST_NUMBERS: f64 = 1e8;
+/// Inputs that the high-gain method is meant for: it poses 2^m inequalities.
+const MOST_HIGH_GAIN_INPUTS: usize = 10;
+/// Characters of a name that becomes part of a file name; file systems allow 255.
+const LONGEST_NAME: usize = 100;
+/// Bytes of a file that is read: a design of thousands of grid points has tens of megabytes.
+const LARGEST_FILE: u64 = 1 << 28;
 
 /// A scenario, ready to design and fly.
 pub struct Scenario {
@@ -74,13 +86,20 @@ struct Door<'a> {
 
 impl Door<'_> {
     fn refuse<T>(&self, key: impl Into<String>, message: impl Into<String>) -> Result<T, Failure> {
-        Err(Failure::BadInput { file: self.file.to_owned(), key: key.into(), message: message.into() })
+        Err(Failure::BadInput {
+            file: self.file.to_owned(),
+            key: key.into(),
+            message: message.into(),
+        })
     }
 
     fn positive(&self, key: &str, value: f64) -> Result<f64, Failure> {
         match value.is_finite() && value > 0.0 {
             true => Ok(value),
-            false => self.refuse(key, format!("is {value}: it has to be a positive, finite number")),
+            false => self.refuse(
+                key,
+                format!("is {value}: it has to be a positive, finite number"),
+            ),
         }
     }
 
@@ -97,8 +116,10 @@ impl Scenario {
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let text = read_text(path)?;
         let door = Door { file: path };
-        let file: ScenarioFile = toml::from_str(&text)
-            .map_err(|error| Failure::Unreadable { file: path.to_owned(), message: error.to_string().trim_end().into() })?;
+        let file: ScenarioFile = toml::from_str(&text).map_err(|error| Failure::Unreadable {
+            file: path.to_owned(),
+            message: error.to_string().trim_end().into(),
+        })?;
 
         file_name_part(&door, "name", &file.name)?;
         let plant_spec = file::plant(&door, file.plant)?;
@@ -119,16 +140,25 @@ impl Scenario {
         let simulation = file.simulation;
         let duration_s = door.positive("simulation.duration_s", simulation.duration_s)?;
         let sample_time_s = door.positive("simulation.sample_time_s", simulation.sample_time_s)?;
-        if duration_s / sample_time_s > 1e7 {
-            return door.refuse("simulation.duration_s", "the flight has more than 10 million samples; fly shorter or sample slower");
+        if sample_time_s > duration_s {
+            let message =
+                format!("is {duration_s}: it cannot be less than sample_time_s = {sample_time_s}");
+            return door.refuse("simulation.duration_s", message);
         }
+        let samples = (duration_s / sample_time_s).round();
+        let last_sample_s = (samples * sample_time_s).min(duration_s);
         if !(1..=1000).contains(&simulation.steps_per_sample) {
             let message = format!("is {}: allowed are 1 to 1000", simulation.steps_per_sample);
             return door.refuse("simulation.steps_per_sample", message);
         }
         let record_interval_s = match simulation.record_interval_s {
             Some(interval) if interval < sample_time_s => {
-                return door.refuse("simulation.record_interval_s", format!("is {interval}: it cannot be less than sample_time_s = {sample_time_s}"));
+                return door.refuse(
+                    "simulation.record_interval_s",
+                    format!(
+                        "is {interval}: it cannot be less than sample_time_s = {sample_time_s}"
+                    ),
+                );
             }
             Some(interval) => door.finite("simulation.record_interval_s", interval)?,
             None => (10.0 * sample_time_s).min(duration_s),
@@ -136,16 +166,43 @@ impl Scenario {
         let trim = plant.trim(0.0);
         let mut initial_state = trim.state.clone();
         for (key, value) in &simulation.initial_state {
-            let (state, value) = state_value(&door, &format!("simulation.initial_state.{key}"), description, key, value)?;
+            let (state, value) = state_value(
+                &door,
+                &format!("simulation.initial_state.{key}"),
+                description,
+                key,
+                value,
+            )?;
             initial_state[state] = value;
+            if simulation.initial_state.contains_key(&format!("{key}_deg")) {
+                return door.refuse(
+                    format!("simulation.initial_state.{key}"),
+                    format!("{key} and {key}_deg are both given; keep one"),
+                );
+            }
         }
         let mut set_points = Vec::new();
         for (k, table) in file.set_point.iter().enumerate() {
-            set_points.push(set_point(&door, &format!("set_point[{}]", k + 1), description, table, duration_s)?);
+            set_points.push(set_point(
+                &door,
+                &format!("set_point[{}]", k + 1),
+                description,
+                table,
+                last_sample_s,
+            )?);
         }
         set_points.sort_by(|a: &(SetPoint, String), b| a.0.time_s.total_cmp(&b.0.time_s));
-        if let Some(pair) = set_points.windows(2).find(|pair| pair[0].0.time_s == pair[1].0.time_s) {
-            return door.refuse("set_point", format!("two set points have time_s = {}; join them", pair[0].0.time_s));
+        if let Some(pair) = set_points
+            .windows(2)
+            .find(|pair| pair[0].0.time_s == pair[1].0.time_s)
+        {
+            return door.refuse(
+                "set_point",
+                format!(
+                    "two set points have time_s = {}; join them",
+                    pair[0].0.time_s
+                ),
+            );
         }
         let (set_points, set_point_labels) = set_points.into_iter().unzip();
         let reference = Reference::new(initial_state.clone(), set_points);
@@ -154,26 +211,64 @@ impl Scenario {
             None => None,
             Some(noise) => Some(NoiseCovariance {
                 process: weights::semidefinite(
-                    &door, "noise.process", noise.process, noise.process_diag, description.disturbances.len(),
+                    &door,
+                    "noise.process",
+                    noise.process,
+                    noise.process_diag,
+                    description.disturbances.len(),
                 )?,
                 measurement: weights::definite(
-                    &door, "noise.measurement", noise.measurement, noise.measurement_diag, description.outputs.len(),
+                    &door,
+                    "noise.measurement",
+                    noise.measurement,
+                    noise.measurement_diag,
+                    description.outputs.len(),
                 )?,
             }),
         };
 
-        let defaults = RequestDefaults { weights: &weights, grid_points, sample_time_s, limits: file.limits.as_ref(), description, operating_input: &trim.input };
+        let defaults = RequestDefaults {
+            weights: &weights,
+            grid_points,
+            sample_time_s,
+            limits: file.limits.as_ref(),
+            description,
+            operating_input: &trim.input,
+        };
         let mut controllers: Vec<ControllerPlan> = Vec::new();
         if file.controller.is_empty() {
-            return door.refuse("controller", "there is none; add at least one [[controller]] table");
+            return door.refuse(
+                "controller",
+                "there is none; add at least one [[controller]] table",
+            );
         }
         for (k, table) in file.controller.into_iter().enumerate() {
             let key = format!("controller[{}]", k + 1);
             let plan = controller(&door, &key, table, &defaults, noise.is_some())?;
-            if controllers.iter().any(|other| other.request.name == plan.request.name) {
-                return door.refuse(format!("{key}.name"), format!("\"{}\" is already taken; names have to differ", plan.request.name));
+            let name = &plan.request.name;
+            // some file systems do not tell "A" from "a"
+            if controllers
+                .iter()
+                .any(|other| other.request.name.eq_ignore_ascii_case(name))
+            {
+                return door.refuse(
+                    format!("{key}.name"),
+                    format!("\"{name}\" is already taken; names have to differ, and not in upper and lower case only"),
+                );
             }
             controllers.push(plan);
+        }
+        let numbers = samples * numbers_per_sample(description, &controllers);
+        if numbers > MOST_NUMBERS {
+            return door.refuse(
+                "simulation.duration_s",
+                format!(
+                    "is {duration_s}: {samples} samples for {} controllers take {:.1} GB; allowed are {:.1} GB: fly shorter, sample slower, or compare fewer controllers",
+                    controllers.len(),
+                    numbers * 8e-9,
+                    MOST_NUMBERS * 8e-9
+                ),
+            );
         }
         Ok(Self {
             title: file.title.unwrap_or_else(|| file.name.clone()),
@@ -212,26 +307,64 @@ impl Scenario {
     }
 }
 
-/// The text of a file; a file that is not there is bad input.
+/// Numbers that a sample of all flights keeps.
+fn numbers_per_sample(description: &Description, controllers: &[ControllerPlan]) -> f64 {
+    let (n, m) = (description.states.len(), description.inputs.len());
+    let of_one = |plan: &ControllerPlan| {
+        let measured = if plan.noise {
+            description.outputs.len()
+        } else {
+            0
+        };
+        let estimated = if plan.estimator { 2 * n } else { 0 };
+        // states, references, inputs; time, cost and the flag of saturation
+        2 * n + m + 3 + measured + estimated
+    };
+    controllers.iter().map(of_one).sum::<usize>() as f64
+}
+
+/// The text of a file; a file that is not there, too large or not UTF-8 is bad input.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path)
-        .map_err(|error| Failure::Unreadable { file: path.to_owned(), message: format!("cannot be read: {error}") })
+    let unreadable = |message: String| Failure::Unreadable {
+        file: path.to_owned(),
+        message,
+    };
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
+        .map_err(|error| unreadable(format!("cannot be read: {error}")))?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(unreadable(format!(
+            "is too large: allowed are {} MiB",
+            LARGEST_FILE >> 20
+        )));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        unreadable(format!(
+            "is not a text file: byte {} is not UTF-8",
+            error.utf8_error().valid_up_to() + 1
+        ))
+    })
 }
 
 /// A name that becomes part of a file name.
 fn file_name_part(door: &Door, key: &str, name: &str) -> Result<(), Failure> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    match !name.is_empty() && name.chars().all(allowed) {
+    match (1..=LONGEST_NAME).contains(&name.len()) && name.chars().all(allowed) {
         true => Ok(()),
-        false => door.refuse(key, format!("\"{name}\": allowed are letters, digits, - and _ (it becomes a file name)")),
+        false => door.refuse(
+            key,
+            format!("{name:?}: allowed are 1 to {LONGEST_NAME} letters, digits, - and _ (it becomes a file name)"),
+        ),
     }
 }
 
 fn grid_points(door: &Door, count: usize, plant: &dyn Plant) -> Result<usize, Failure> {
     match plant.description().scheduling {
-        Some(_) if !(4..=4096).contains(&count) => {
-            door.refuse("model.grid_points", format!("is {count}: allowed are 4 to 4096"))
-        }
+        Some(_) if !(4..=4096).contains(&count) => door.refuse(
+            "model.grid_points",
+            format!("is {count}: allowed are 4 to 4096"),
+        ),
         _ => Ok(count),
     }
 }
@@ -239,7 +372,9 @@ fn grid_points(door: &Door, count: usize, plant: &dyn Plant) -> Result<usize, Fa
 fn stabilizable(door: &Door, model: &GridModel) -> Result<(), Failure> {
     for point in &model.points {
         if let Some((re, im)) = unstabilizable_mode(&point.a, &point.b) {
-            let parameter = model.scheduling.as_ref().map_or(String::new(), |s| format!(" at {} = {:.4}", s.parameter, point.rho));
+            let parameter = model.scheduling.as_ref().map_or(String::new(), |s| {
+                format!(" at {} = {:.4}", s.parameter, point.rho)
+            });
             let message = format!(
                 "the pair (A, B) is not stabilisable{parameter}: no input moves the mode {re:.4} {im:+.4}i, which does not decay by itself"
             );
@@ -260,13 +395,35 @@ fn state_value(
     let number = match value {
         toml::Value::Float(value) => *value,
         toml::Value::Integer(value) => *value as f64,
-        other => return door.refuse(key, format!("is a {}: it has to be a number", other.type_str())),
+        other => {
+            return door.refuse(
+                key,
+                format!("is a {}: it has to be a number", other.type_str()),
+            );
+        }
     };
     let number = door.finite(key, number)?;
-    let in_degrees = name.strip_suffix("_deg").and_then(|name| description.state(name));
+    let in_degrees = name
+        .strip_suffix("_deg")
+        .and_then(|name| description.state(name));
+    let in_range = |state: usize, value: f64| {
+        let limit = description.state_limits[state].map_or(FARTHEST, |limit| limit.min(FARTHEST));
+        match value.abs() < limit {
+            true => Ok((state, value)),
+            false => door.refuse(
+                key,
+                format!(
+                    "is {value:.6e} {unit}: allowed are values between -{limit:.6} and {limit:.6} {unit}",
+                    unit = description.states[state].unit
+                ),
+            ),
+        }
+    };
     match (description.state(name), in_degrees) {
-        (Some(state), _) => Ok((state, number)),
-        (None, Some(state)) if description.states[state].unit == "rad" => Ok((state, number.to_radians())),
+        (Some(state), _) => in_range(state, number),
+        (None, Some(state)) if description.states[state].unit == "rad" => {
+            in_range(state, number.to_radians())
+        }
         _ => {
             let names: Vec<String> = (description.states.iter())
                 .map(|signal| match signal.unit.as_str() {
@@ -274,7 +431,13 @@ fn state_value(
                     _ => signal.name.clone(),
                 })
                 .collect();
-            door.refuse(key, format!("is not a state of the plant; allowed are {}", names.join(", ")))
+            door.refuse(
+                key,
+                format!(
+                    "is not a state of the plant; allowed are {}",
+                    names.join(", ")
+                ),
+            )
         }
     }
 }
@@ -284,7 +447,7 @@ fn set_point(
     key: &str,
     description: &Description,
     table: &toml::Table,
-    duration_s: f64,
+    last_sample_s: f64,
 ) -> Result<(SetPoint, String), Failure> {
     let (mut time_s, mut label, mut targets) = (None, None, Vec::new());
     for (name, value) in table {
@@ -294,28 +457,55 @@ fn set_point(
             ("time_s", toml::Value::Integer(time)) => time_s = Some(*time as f64),
             ("label", toml::Value::String(text)) => label = Some(text.clone()),
             ("time_s" | "label", other) => {
-                let expected = if name == "label" { "a string" } else { "a number of seconds" };
-                return door.refuse(key, format!("is a {}: it has to be {expected}", other.type_str()));
+                let expected = if name == "label" {
+                    "a string"
+                } else {
+                    "a number of seconds"
+                };
+                return door.refuse(
+                    key,
+                    format!("is a {}: it has to be {expected}", other.type_str()),
+                );
             }
             _ => targets.push(state_value(door, &key, description, name, value)?),
         }
     }
     let Some(time_s) = time_s else {
-        return door.refuse(format!("{key}.time_s"), "is missing: say when the set point takes effect, in seconds");
-    };
-    if !(0.0..duration_s).contains(&time_s) {
         return door.refuse(
             format!("{key}.time_s"),
-            format!("is {time_s}: it has to lie in the flight, from 0 to below {duration_s} s"),
+            "is missing: say when the set point takes effect, in seconds",
+        );
+    };
+    if !(0.0..last_sample_s).contains(&time_s) {
+        return door.refuse(
+            format!("{key}.time_s"),
+            format!("is {time_s}: it has to lie in the flight, from 0 to below {last_sample_s} s"),
         );
     }
     if targets.is_empty() {
-        return door.refuse(key, "moves no state; give at least one, such as r_x = 1.0");
+        let example = &description.states[0].name;
+        return door.refuse(
+            key,
+            format!("moves no state; give at least one, such as {example} = 1.0"),
+        );
+    }
+    if let Some(name) = table
+        .keys()
+        .find(|name| table.contains_key(&format!("{name}_deg")))
+    {
+        return door.refuse(
+            format!("{key}.{name}"),
+            format!("{name} and {name}_deg are both given; keep one"),
+        );
     }
     let spell = |&(state, value): &(usize, f64)| {
         let signal = &description.states[state];
         match signal.unit.as_str() {
-            "rad" => format!("{} = {}°", signal.name, (value.to_degrees() * 1e6).round() / 1e6),
+            "rad" => format!(
+                "{} = {}°",
+                signal.name,
+                (value.to_degrees() * 1e6).round() / 1e6
+            ),
             unit => format!("{} = {value} {unit}", signal.name),
         }
     };
@@ -341,10 +531,27 @@ fn controller(
     has_noise: bool,
 ) -> Result<ControllerPlan, Failure> {
     file_name_part(door, &format!("{key}.name"), &table.name)?;
+    if table.unlimited && table.limits.is_some() {
+        return door.refuse(
+            format!("{key}.unlimited"),
+            "contradicts the limits of this controller; keep one",
+        );
+    }
+    let label = table.label.unwrap_or_else(|| table.name.clone());
+    if label.chars().any(char::is_control) {
+        return door.refuse(
+            format!("{key}.label"),
+            "has a line break or another control character: it has to fit into a line of a table",
+        );
+    }
     let limits = match (table.unlimited, table.limits.as_ref().or(defaults.limits)) {
         (true, _) | (false, None) => InputLimits::none(defaults.operating_input.len()),
         (false, Some(limits)) => {
-            let place = if table.limits.is_some() { format!("{key}.limits") } else { "limits".into() };
+            let place = if table.limits.is_some() {
+                format!("{key}.limits")
+            } else {
+                "limits".into()
+            };
             input_limits(door, &place, limits, defaults)?
         }
     };
@@ -357,7 +564,12 @@ fn controller(
         (file::MethodName::Lpvqr, Some(_)) => {
             return door.refuse(format!("{key}.gamma"), "method \"lpvqr\" knows no γ; remove it, or choose \"slpvqr\" or \"high-gain-slpvqr\"");
         }
-        (_, None) => return door.refuse(format!("{key}.gamma"), "is missing: the saturated methods need the level γ > 0 of their certified set"),
+        (_, None) => {
+            return door.refuse(
+                format!("{key}.gamma"),
+                "is missing: the saturated methods need the level γ > 0 of their certified set",
+            );
+        }
         (file::MethodName::Slpvqr, Some(gamma)) => Method::Slpvqr { gamma },
         (file::MethodName::HighGainSlpvqr, Some(gamma)) => {
             let high_gain = table.high_gain.unwrap_or_default();
@@ -366,19 +578,51 @@ fn controller(
         }
     };
     if table.high_gain.is_some() && !matches!(method, Method::HighGainSlpvqr { .. }) {
-        return door.refuse(format!("{key}.high_gain"), "belongs to method \"high-gain-slpvqr\" only");
+        return door.refuse(
+            format!("{key}.high_gain"),
+            "belongs to method \"high-gain-slpvqr\" only",
+        );
     }
-    if method.gamma().is_some() && limits.symmetric_bound(defaults.operating_input).is_none() {
-        return door.refuse(format!("{key}.limits"), "a saturated method needs a limit on every input; give [limits] min and max");
+    if let Some(gamma) = method.gamma() {
+        let Some(sigma) = limits.symmetric_bound(defaults.operating_input) else {
+            return door.refuse(
+                format!("{key}.limits"),
+                "a saturated method needs a limit on every input; give [limits] min and max",
+            );
+        };
+        if !sigma
+            .iter()
+            .all(|sigma| (sigma * sigma / gamma).is_normal())
+        {
+            return door.refuse(
+                format!("{key}.gamma"),
+                format!(
+                    "is {gamma:e}: limit²/γ is too large or too small a number to calculate with"
+                ),
+            );
+        }
+    }
+    let inputs = defaults.operating_input.len();
+    if matches!(method, Method::HighGainSlpvqr { .. }) && inputs > MOST_HIGH_GAIN_INPUTS {
+        return door.refuse(
+            format!("{key}.method"),
+            format!("\"high-gain-slpvqr\" is for up to {MOST_HIGH_GAIN_INPUTS} inputs, because it has 2^m inequalities for m of them; the plant has {inputs}: choose \"slpvqr\""),
+        );
     }
     if (table.noise || table.estimator.is_some()) && !has_noise {
-        return door.refuse(format!("{key}.noise"), "the scenario has no [noise] table to take covariances from");
+        return door.refuse(
+            format!("{key}.noise"),
+            "the scenario has no [noise] table to take covariances from",
+        );
     }
     if table.estimator.is_some() && !table.noise {
-        return door.refuse(format!("{key}.estimator"), "an estimator needs measurements: set noise = true");
+        return door.refuse(
+            format!("{key}.estimator"),
+            "an estimator needs measurements: set noise = true",
+        );
     }
     Ok(ControllerPlan {
-        label: table.label.unwrap_or_else(|| table.name.clone()),
+        label,
         request: DesignRequest {
             name: table.name,
             method,
@@ -396,10 +640,22 @@ fn controller(
 
 fn check_high_gain(door: &Door, key: &str, options: &HighGainOptions) -> Result<(), Failure> {
     if !(options.recovery >= 0.0 && options.recovery.is_finite()) {
-        return door.refuse(format!("{key}.recovery"), format!("is {}: it has to be a fraction, zero or more", options.recovery));
+        return door.refuse(
+            format!("{key}.recovery"),
+            format!(
+                "is {}: it has to be a fraction, zero or more",
+                options.recovery
+            ),
+        );
     }
     if !(options.gain_margin >= 1.0 && options.gain_margin.is_finite()) {
-        return door.refuse(format!("{key}.gain_margin"), format!("is {}: it has to be a factor of at least 1", options.gain_margin));
+        return door.refuse(
+            format!("{key}.gain_margin"),
+            format!(
+                "is {}: it has to be a factor of at least 1",
+                options.gain_margin
+            ),
+        );
     }
     Ok(())
 }
@@ -411,21 +667,41 @@ fn input_limits(
     defaults: &RequestDefaults,
 ) -> Result<InputLimits, Failure> {
     let m = defaults.operating_input.len();
+    // a limit of -∞ below or ∞ above is none
+    let limit = |side: &str, value: f64| {
+        let none = if side == "min" {
+            f64::NEG_INFINITY
+        } else {
+            f64::INFINITY
+        };
+        Some(value).filter(|&value| value != none)
+    };
     let spread = |side: &str, bound: &Option<file::Bound>| match bound {
         None => Ok(vec![None; m]),
-        Some(file::Bound::All(value)) => Ok(vec![Some(*value); m]),
-        Some(file::Bound::Each(values)) if values.len() == m => Ok(values.iter().copied().map(Some).collect()),
-        Some(file::Bound::Each(values)) => {
-            door.refuse(format!("{key}.{side}"), format!("has {} numbers: the plant has {m} inputs", values.len()))
+        Some(file::Bound::All(value)) => Ok(vec![limit(side, *value); m]),
+        Some(file::Bound::Each(values)) if values.len() == m => {
+            Ok(values.iter().map(|&value| limit(side, value)).collect())
         }
+        Some(file::Bound::Each(values)) => door.refuse(
+            format!("{key}.{side}"),
+            format!("has {} numbers: the plant has {m} inputs", values.len()),
+        ),
     };
-    let limits = InputLimits { min: spread("min", &table.min)?, max: spread("max", &table.max)? };
-    for (i, (&operating, signal)) in defaults.operating_input.iter().zip(&defaults.description.inputs).enumerate() {
+    let limits = InputLimits {
+        min: spread("min", &table.min)?,
+        max: spread("max", &table.max)?,
+    };
+    for (i, (&operating, signal)) in defaults
+        .operating_input
+        .iter()
+        .zip(&defaults.description.inputs)
+        .enumerate()
+    {
         let outside = |side: &str, bound: f64| {
             door.refuse(
                 format!("{key}.{side}"),
                 format!(
-                    "is {bound} for {}: the limits exclude the operating input {operating} {}, at which the plant rests; it has to lie strictly between min and max",
+                    "is {bound:?} for {}: the limits exclude the operating input {operating} {}, at which the plant rests; it has to lie strictly between min and max",
                     signal.name, signal.unit
                 ),
             )

@@ -1,4 +1,11 @@
 //! Integration tests, one binary.
 
+mod hostile;
+mod modelling;
+mod outcomes;
 mod plants;
 mod quadrotor;
+mod random;
+mod regulator;
+mod sdpa_format;
+mod sdplib;

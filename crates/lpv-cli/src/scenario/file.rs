@@ -68,7 +68,10 @@ pub struct NoiseTable {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "expected a number for all inputs, or a list with one for each")]
+#[serde(
+    untagged,
+    expecting = "expected a number for all inputs, or a list with one for each"
+)]
 pub enum Bound {
     All(f64),
     Each(Vec<f64>),
@@ -137,21 +140,38 @@ pub(super) fn plant(door: &Door, mut table: toml::Table) -> Result<PlantSpec, Fa
     const NAMES: &str = "\"quadrotor\", \"pendulum\", \"double-integrator\", \"linear\"";
     let name = match table.remove("name") {
         Some(toml::Value::String(name)) => name,
-        Some(other) => return door.refuse("plant.name", format!("is a {}: allowed are {NAMES}", other.type_str())),
+        Some(other) => {
+            return door.refuse(
+                "plant.name",
+                format!("is a {}: allowed are {NAMES}", other.type_str()),
+            );
+        }
         None => return door.refuse("plant.name", format!("is missing: allowed are {NAMES}")),
     };
     match name.as_str() {
-        "quadrotor" => Ok(PlantSpec::Quadrotor(parameters::<QuadrotorParameters>(door, table)?)),
-        "linear" => Ok(PlantSpec::Linear(parameters::<LinearParameters>(door, table)?)),
+        "quadrotor" => Ok(PlantSpec::Quadrotor(parameters::<QuadrotorParameters>(
+            door, table,
+        )?)),
+        "linear" => Ok(PlantSpec::Linear(parameters::<LinearParameters>(
+            door, table,
+        )?)),
         "pendulum" | "double-integrator" => match table.keys().next() {
-            Some(key) => door.refuse(format!("plant.{key}"), format!("plant \"{name}\" has no parameters; remove it")),
+            Some(key) => door.refuse(
+                format!("plant.{key}"),
+                format!("plant \"{name}\" has no parameters; remove it"),
+            ),
             None if name == "pendulum" => Ok(PlantSpec::Pendulum {}),
             None => Ok(PlantSpec::DoubleIntegrator {}),
         },
-        _ => door.refuse("plant.name", format!("\"{name}\" is not a plant: allowed are {NAMES}")),
+        _ => door.refuse(
+            "plant.name",
+            format!("\"{name}\" is not a plant: allowed are {NAMES}"),
+        ),
     }
 }
 
 fn parameters<T: DeserializeOwned>(door: &Door, table: toml::Table) -> Result<T, Failure> {
-    table.try_into().or_else(|error: toml::de::Error| door.refuse("plant", error.to_string().trim_end()))
+    table
+        .try_into()
+        .or_else(|error: toml::de::Error| door.refuse("plant", error.to_string().trim_end()))
 }

@@ -20,14 +20,29 @@ pub struct BlockMargin {
 /// (5.20) for all 2^m mixtures and (5.21) for high gain.
 ///
 /// The blocks are in Y = P⁻¹ and L = KY, as printed. `model` is the linearisation at the point's parameter.
-pub fn block_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> Vec<BlockMargin> {
-    let mut margins = vec![BlockMargin { name: "P".into(), smallest_eigenvalue: smallest_eigenvalue(&point.p) }];
-    let inverses = (inverse_spd(&point.p), inverse_spd(&design.weights.q), inverse_spd(&design.weights.r));
+pub fn block_margins(
+    design: &Design,
+    point: &FrozenDesign,
+    model: &FrozenModel,
+) -> Vec<BlockMargin> {
+    let mut margins = vec![BlockMargin {
+        name: "P".into(),
+        smallest_eigenvalue: smallest_eigenvalue(&point.p),
+    }];
+    let inverses = (
+        inverse_spd(&point.p),
+        inverse_spd(&design.weights.q),
+        inverse_spd(&design.weights.r),
+    );
     let (Some(y), Some(q_inverse), Some(r_inverse)) = inverses else {
-        margins.push(BlockMargin { name: "P, Q, R invertible".into(), smallest_eigenvalue: f64::NAN });
+        margins.push(BlockMargin {
+            name: "P, Q, R invertible".into(),
+            smallest_eigenvalue: f64::NAN,
+        });
         return margins;
     };
-    let performance = |gain: &Mat<f64>| performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
+    let performance =
+        |gain: &Mat<f64>| performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
 
     match &point.auxiliary_gain {
         None => margins.push(BlockMargin {
@@ -38,7 +53,11 @@ pub fn block_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel)
             let inputs = point.gain.nrows();
             margins.extend((0..1usize << inputs).map(|vertex| {
                 let mixture = Mat::from_fn(inputs, point.gain.ncols(), |i, j| {
-                    if vertex >> i & 1 == 1 { point.gain[(i, j)] } else { auxiliary[(i, j)] }
+                    if vertex >> i & 1 == 1 {
+                        point.gain[(i, j)]
+                    } else {
+                        auxiliary[(i, j)]
+                    }
                 });
                 BlockMargin {
                     name: format!("performance of mixture {vertex:0inputs$b}"),
@@ -48,13 +67,19 @@ pub fn block_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel)
         }
     }
     let limits = &design.controller.limits;
-    if let (Some(gamma), Some(sigma)) =
-        (design.method.gamma(), limits.symmetric_bound(&design.controller.operating_input))
-    {
+    if let (Some(gamma), Some(sigma)) = (
+        design.method.gamma(),
+        limits.symmetric_bound(&design.controller.operating_input),
+    ) {
         let unsaturated = point.auxiliary_gain.as_ref().unwrap_or(&point.gain) * &y;
         margins.extend(sigma.iter().enumerate().map(|(i, bound)| BlockMargin {
             name: format!("input {} unsaturated", i + 1),
-            smallest_eigenvalue: smallest_eigenvalue(&unsaturated_block(&y, &unsaturated, i, bound * bound / gamma)),
+            smallest_eigenvalue: smallest_eigenvalue(&unsaturated_block(
+                &y,
+                &unsaturated,
+                i,
+                bound * bound / gamma,
+            )),
         }));
     }
     margins

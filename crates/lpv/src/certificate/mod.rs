@@ -74,18 +74,35 @@ pub fn check(design: &Design, plant: &dyn Plant) -> Vec<Claim> {
         Some(scheduling) => format!("at {} = {rho:.4} {}", scheduling.parameter, scheduling.unit),
         None => "at the operating point".into(),
     };
-    let verdict = |margin: f64| if margin > 0.0 { Verdict::Numerical } else { Verdict::Refuted };
+    let verdict = |margin: f64| {
+        if margin > 0.0 {
+            Verdict::Numerical
+        } else {
+            Verdict::Refuted
+        }
+    };
     claims.push(Claim {
         claim: "frozen closed loop is stable".into(),
         verdict: verdict(-stability.abscissa),
         margin: -stability.abscissa,
-        detail: format!("max Re λ = {:.4} 1/s {}, {count} parameter values", stability.abscissa, at(stability.abscissa_at)),
+        detail: format!(
+            "max Re λ = {:.4} 1/s {}, {count} parameter values",
+            stability.abscissa,
+            at(stability.abscissa_at)
+        ),
     });
     claims.push(Claim {
-        claim: format!("sampled closed loop is stable at T = {} s", design.sample_time_s),
+        claim: format!(
+            "sampled closed loop is stable at T = {} s",
+            design.sample_time_s
+        ),
         verdict: verdict(1.0 - stability.radius),
         margin: 1.0 - stability.radius,
-        detail: format!("max |λ| = {:.6} {}, {count} parameter values", stability.radius, at(stability.radius_at)),
+        detail: format!(
+            "max |λ| = {:.6} {}, {count} parameter values",
+            stability.radius,
+            at(stability.radius_at)
+        ),
     });
     claims
 }
@@ -94,16 +111,29 @@ fn inequalities_claim(design: &Design, plant: &dyn Plant) -> Claim {
     let margins: Vec<(f64, BlockMargin)> = (design.points.iter())
         .flat_map(|point| {
             let model = linearize(plant, point.rho);
-            block_margins(design, point, &model).into_iter().map(|block| (point.rho, block))
+            block_margins(design, point, &model)
+                .into_iter()
+                .map(|block| (point.rho, block))
         })
         .collect();
     let claim = "matrix inequalities hold at every grid point".to_string();
-    let worst = margins.iter().min_by(|a, b| nan_first(a.1.smallest_eigenvalue, b.1.smallest_eigenvalue));
+    let worst = margins
+        .iter()
+        .min_by(|a, b| nan_first(a.1.smallest_eigenvalue, b.1.smallest_eigenvalue));
     match worst {
-        None => Claim { claim, verdict: Verdict::Undecided, margin: f64::NAN, detail: "the design has no points".into() },
+        None => Claim {
+            claim,
+            verdict: Verdict::Undecided,
+            margin: f64::NAN,
+            detail: "the design has no points".into(),
+        },
         Some((rho, block)) => Claim {
             claim,
-            verdict: if block.smallest_eigenvalue > 0.0 { Verdict::Numerical } else { Verdict::Refuted },
+            verdict: if block.smallest_eigenvalue > 0.0 {
+                Verdict::Numerical
+            } else {
+                Verdict::Refuted
+            },
             margin: block.smallest_eigenvalue,
             detail: format!(
                 "least λ_min = {:.3e} of {} blocks, in \"{}\" at parameter {rho:.4}",

@@ -1,6 +1,8 @@
 //! The continuous algebraic Riccati equation Aᵀ P + P A − P B R⁻¹ Bᵀ P + Q = 0, thesis (2.31).
 
-use super::matrix::{blocks_2x2, identity, inverse, inverse_spd, is_finite, least_squares, symmetric_part};
+use super::matrix::{
+    blocks_2x2, identity, inverse, inverse_spd, is_finite, least_squares, symmetric_part,
+};
 use super::{Mat, eigen, lyapunov};
 
 /// The stabilising solution of the Riccati equation and the gain that it gives.
@@ -27,7 +29,9 @@ pub enum RiccatiError {
         im: f64,
     },
     /// The Hamiltonian matrix has eigenvalues on the imaginary axis.
-    #[error("the Hamiltonian matrix has eigenvalues on the imaginary axis: (Q, A) has an undetectable mode there; weigh it in Q")]
+    #[error(
+        "the Hamiltonian matrix has eigenvalues on the imaginary axis: (Q, A) has an undetectable mode there; weigh it in Q"
+    )]
     ImaginaryAxis,
 }
 
@@ -38,7 +42,12 @@ pub enum RiccatiError {
 ///
 /// # Errors
 /// See [`RiccatiError`].
-pub fn solve(a: &Mat<f64>, b: &Mat<f64>, q: &Mat<f64>, r: &Mat<f64>) -> Result<Regulator, RiccatiError> {
+pub fn solve(
+    a: &Mat<f64>,
+    b: &Mat<f64>,
+    q: &Mat<f64>,
+    r: &Mat<f64>,
+) -> Result<Regulator, RiccatiError> {
     let n = a.nrows();
     let r_inverse = inverse_spd(r).ok_or(RiccatiError::InputWeight)?;
     if let Some((re, im)) = eigen::unstabilizable_mode(a, b) {
@@ -47,13 +56,22 @@ pub fn solve(a: &Mat<f64>, b: &Mat<f64>, q: &Mat<f64>, r: &Mat<f64>) -> Result<R
     let g = b * &r_inverse * b.transpose();
     let minus = |m: &Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| -m[(i, j)]);
     let minus_a_transposed = minus(&a.transpose().to_owned());
-    let hamiltonian = blocks_2x2(a.as_ref(), minus(&g).as_ref(), minus(q).as_ref(), minus_a_transposed.as_ref());
+    let hamiltonian = blocks_2x2(
+        a.as_ref(),
+        minus(&g).as_ref(),
+        minus(q).as_ref(),
+        minus_a_transposed.as_ref(),
+    );
     let sign = matrix_sign(hamiltonian).ok_or(RiccatiError::ImaginaryAxis)?;
 
     // (sign + I)[I; P] = 0: 2n × n equations for P
-    let left = Mat::from_fn(2 * n, n, |i, j| sign[(i, n + j)] + if i == n + j { 1.0 } else { 0.0 });
-    let right = Mat::from_fn(2 * n, n, |i, j| -sign[(i, j)] - if i == j { 1.0 } else { 0.0 });
-    let mut p = symmetric_part(&least_squares(&left, &right));
+    let left = Mat::from_fn(2 * n, n, |i, j| {
+        sign[(i, n + j)] + if i == n + j { 1.0 } else { 0.0 }
+    });
+    let right = Mat::from_fn(2 * n, n, |i, j| {
+        -sign[(i, j)] - if i == j { 1.0 } else { 0.0 }
+    });
+    let mut p = symmetric_part(&least_squares(&left, &right).ok_or(RiccatiError::ImaginaryAxis)?);
 
     for _ in 0..3 {
         let closed_loop = a - &g * &p;
@@ -77,7 +95,9 @@ fn matrix_sign(mut s: Mat<f64>) -> Option<Mat<f64>> {
             return None;
         }
         let scale = (s_inverse.norm_l2() / s.norm_l2()).sqrt();
-        let next = Mat::from_fn(size, size, |i, j| 0.5 * (scale * s[(i, j)] + s_inverse[(i, j)] / scale));
+        let next = Mat::from_fn(size, size, |i, j| {
+            0.5 * (scale * s[(i, j)] + s_inverse[(i, j)] / scale)
+        });
         let change = (&next - &s).norm_l2();
         s = next;
         if change <= 1e-12 * s.norm_l2() {
@@ -128,6 +148,9 @@ mod tests {
         let b = from_rows(&[vec![0.0], vec![1.0]]);
         let error = solve(&a, &b, &identity(2), &identity(1)).unwrap_err();
         assert_eq!(error, RiccatiError::Unstabilizable { re: 1.0, im: 0.0 });
-        assert_eq!(solve(&a, &b, &identity(2), &diagonal(&[-1.0])).unwrap_err(), RiccatiError::InputWeight);
+        assert_eq!(
+            solve(&a, &b, &identity(2), &diagonal(&[-1.0])).unwrap_err(),
+            RiccatiError::InputWeight
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! The plants that a file can name, each with its parameters.
 
-use super::quadrotor::QuadrotorParameters;
 use super::linear::{Linear, LinearParameters};
+use super::quadrotor::QuadrotorParameters;
 use super::{DoubleIntegrator, Pendulum, Plant, Quadrotor};
 use serde::{Deserialize, Serialize};
 

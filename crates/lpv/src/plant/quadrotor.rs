@@ -68,14 +68,28 @@ impl Quadrotor {
     /// The quadrotor with the given parameters.
     pub fn new(parameters: QuadrotorParameters) -> Self {
         let mut states = Signal::list(&[
-            ("v_x", "m/s"), ("v_y", "m/s"), ("v_z", "m/s"),
-            ("r_x", "m"), ("r_y", "m"), ("r_z", "m"),
-            ("p", "rad/s"), ("q", "rad/s"), ("r", "rad/s"),
-            ("phi", "rad"), ("theta", "rad"), ("psi", "rad"),
+            ("v_x", "m/s"),
+            ("v_y", "m/s"),
+            ("v_z", "m/s"),
+            ("r_x", "m"),
+            ("r_y", "m"),
+            ("r_z", "m"),
+            ("p", "rad/s"),
+            ("q", "rad/s"),
+            ("r", "rad/s"),
+            ("phi", "rad"),
+            ("theta", "rad"),
+            ("psi", "rad"),
         ]);
         states[11].wraps = true;
-        let mut outputs =
-            Signal::list(&[("r_x", "m"), ("r_y", "m"), ("r_z", "m"), ("phi", "rad"), ("theta", "rad"), ("psi", "rad")]);
+        let mut outputs = Signal::list(&[
+            ("r_x", "m"),
+            ("r_y", "m"),
+            ("r_z", "m"),
+            ("phi", "rad"),
+            ("theta", "rad"),
+            ("psi", "rad"),
+        ]);
         outputs[5].wraps = true;
         let arm = parameters.arm_length_m;
         let mut state_limits = vec![None; 12];
@@ -102,10 +116,18 @@ impl Quadrotor {
                 position: [3, 4, 5],
                 euler_xyz: [9, 10, 11],
                 arm_length_m: arm,
-                rotors: vec![[arm, 0.0, 0.0], [0.0, arm, 0.0], [-arm, 0.0, 0.0], [0.0, -arm, 0.0]],
+                rotors: vec![
+                    [arm, 0.0, 0.0],
+                    [0.0, arm, 0.0],
+                    [-arm, 0.0, 0.0],
+                    [0.0, -arm, 0.0],
+                ],
             }),
         };
-        Self { parameters, description }
+        Self {
+            parameters,
+            description,
+        }
     }
 }
 
@@ -118,7 +140,10 @@ impl Equations for Quadrotor {
     fn trim(&self, psi_rad: f64) -> OperatingPoint {
         let mut state = vec![0.0; 12];
         state[11] = psi_rad;
-        OperatingPoint { state, input: vec![self.parameters.mass_kg * self.parameters.gravity_m_s2 / 4.0; 4] }
+        OperatingPoint {
+            state,
+            input: vec![self.parameters.mass_kg * self.parameters.gravity_m_s2 / 4.0; 4],
+        }
     }
 
     /// (6.8): (3.26) with the process noise wᵢ added to each rotor force.

@@ -103,14 +103,22 @@ impl Simulation<'_> {
         let (n, m) = (description.states.len(), description.inputs.len());
         let (nw, ny) = (description.disturbances.len(), description.outputs.len());
         let covariance = self.noise.filter(|_| self.estimate);
-        let mut filter = covariance.map(|covariance| Ekf::new(self.plant, covariance, self.sample_time_s));
+        let mut filter =
+            covariance.map(|covariance| Ekf::new(self.plant, covariance, self.sample_time_s));
         let mut consistency = covariance.map(|_| ConsistencyStatistics::new(n));
         let mut process = self.noise.map(|noise| {
             let held = 1.0 / (self.sample_time_s * self.sample_time_s);
             NoiseStream::new(self.seed, self.run, Channel::Process, &noise.process, held)
         });
-        let mut measurement =
-            self.noise.map(|noise| NoiseStream::new(self.seed, self.run, Channel::Measurement, &noise.measurement, 1.0));
+        let mut measurement = self.noise.map(|noise| {
+            NoiseStream::new(
+                self.seed,
+                self.run,
+                Channel::Measurement,
+                &noise.measurement,
+                1.0,
+            )
+        });
 
         // z = [x, J, x̂, P]; the last two only with a filter
         let size = n + 1 + if filter.is_some() { n + n * n } else { 0 };
@@ -124,7 +132,8 @@ impl Simulation<'_> {
         let mut law = Law::new(controller, n);
         let mut method = RungeKutta4::new(size);
         let mut trajectory = Trajectory::default();
-        let (mut u, mut w, mut v, mut y) = (vec![0.0; m], vec![0.0; nw], vec![0.0; ny], vec![0.0; ny]);
+        let (mut u, mut w, mut v, mut y) =
+            (vec![0.0; m], vec![0.0; nw], vec![0.0; ny], vec![0.0; ny]);
         let (mut deviation, mut error) = (vec![0.0; m], vec![0.0; n]);
         let samples = (self.duration_s / self.sample_time_s).round() as usize;
         let step_s = self.sample_time_s / self.steps_per_sample as f64;
@@ -133,16 +142,28 @@ impl Simulation<'_> {
         for k in 0..=samples {
             let t_s = k as f64 * self.sample_time_s;
             if let Some(state) = (0..n).find(|&i| {
-                let limit = description.state_limits[i].unwrap_or(DIVERGED).min(DIVERGED);
+                let limit = description.state_limits[i]
+                    .unwrap_or(DIVERGED)
+                    .min(DIVERGED);
                 !(z[i].abs() < limit) // true for NaN too
             }) {
-                outcome = Outcome::Diverged { time_s: t_s, state, value: z[state] };
+                outcome = Outcome::Diverged {
+                    time_s: t_s,
+                    state,
+                    value: z[state],
+                };
                 break;
             }
             let reference = self.reference.at(t_s);
-            let feedback = if filter.is_some() { &z[n + 1..2 * n + 1] } else { &z[..n] };
+            let feedback = if filter.is_some() {
+                &z[n + 1..2 * n + 1]
+            } else {
+                &z[..n]
+            };
             description.state_error(feedback, &reference, &mut error);
-            let rho = controller.scheduling_state.map_or(0.0, |state| feedback[state]);
+            let rho = controller
+                .scheduling_state
+                .map_or(0.0, |state| feedback[state]);
             let saturated = law.input(rho, &error, &mut u);
             if let Some(process) = &mut process {
                 process.next(&mut w);
@@ -157,7 +178,11 @@ impl Simulation<'_> {
                 description.state_error(estimate, &z[..n], &mut error);
                 statistics.add(&error, covariance);
                 trajectory.estimates.push(estimate.to_vec());
-                trajectory.deviations.push((0..n).map(|i| covariance[i * n + i].max(0.0).sqrt()).collect());
+                trajectory.deviations.push(
+                    (0..n)
+                        .map(|i| covariance[i * n + i].max(0.0).sqrt())
+                        .collect(),
+                );
             }
             trajectory.time_s.push(t_s);
             trajectory.states.push(z[..n].to_vec());
@@ -165,7 +190,11 @@ impl Simulation<'_> {
             trajectory.saturated.push(saturated);
             trajectory.cost.push(z[n]);
 
-            for ((d, u), operating) in deviation.iter_mut().zip(&u).zip(&controller.operating_input) {
+            for ((d, u), operating) in deviation
+                .iter_mut()
+                .zip(&u)
+                .zip(&controller.operating_input)
+            {
                 *d = u - operating;
             }
             for step in 0..self.steps_per_sample {
@@ -185,7 +214,11 @@ impl Simulation<'_> {
             }
             trajectory.references.push(reference);
         }
-        Flight { outcome, trajectory, consistency: consistency.map(|statistics| statistics.result()) }
+        Flight {
+            outcome,
+            trajectory,
+            consistency: consistency.map(|statistics| statistics.result()),
+        }
     }
 }
 
@@ -206,12 +239,18 @@ impl StageCost {
                 .map(|(k, value)| (k / columns, k % columns, value))
                 .collect()
         };
-        Self { state: entries(q), input: entries(r) }
+        Self {
+            state: entries(q),
+            input: entries(r),
+        }
     }
 
     fn value(&self, error: &[f64], deviation: &[f64]) -> f64 {
         let form = |entries: &[(usize, usize, f64)], v: &[f64]| {
-            entries.iter().map(|&(i, j, value)| value * v[i] * v[j]).sum::<f64>()
+            entries
+                .iter()
+                .map(|&(i, j, value)| value * v[i] * v[j])
+                .sum::<f64>()
         };
         form(&self.state, error) + form(&self.input, deviation)
     }

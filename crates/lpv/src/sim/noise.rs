@@ -1,7 +1,7 @@
 //! Gaussian noise from counter-based streams: the same (seed, run, channel) gives the same numbers on any thread.
 
 use crate::math::Mat;
-use faer::Side;
+use crate::math::matrix::semidefinite_factor;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha12Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -29,14 +29,16 @@ impl NoiseStream {
         let n = covariance.nrows();
         let mut generator = ChaCha12Rng::seed_from_u64(seed);
         generator.set_stream(run << 1 | u64::from(channel == Channel::Measurement));
-        // eigenvalues, not Cholesky: a covariance may be singular
-        let factor = match covariance.self_adjoint_eigen(Side::Lower) {
-            Ok(eigen) => (0..n)
-                .map(|i| (0..n).map(|j| eigen.U()[(i, j)] * (scale * eigen.S()[j].max(0.0)).sqrt()).collect())
-                .collect(),
-            Err(_) => vec![vec![f64::NAN; n]; n],
+        let root = scale.sqrt();
+        let factor = match semidefinite_factor(covariance) {
+            Some(factor) => (0..n).map(|i| (0..n).map(|j| factor[(i, j)] * root).collect()).collect(),
+            None => vec![vec![f64::NAN; n]; n],
         };
-        Self { generator, factor, normal: vec![0.0; n] }
+        Self {
+            generator,
+            factor,
+            normal: vec![0.0; n],
+        }
     }
 
     /// The next vector.
@@ -89,7 +91,12 @@ mod tests {
             v[0]
         };
         assert_eq!(draw(1, 0, Channel::Process), draw(1, 0, Channel::Process));
-        let draws = [draw(1, 0, Channel::Process), draw(1, 0, Channel::Measurement), draw(1, 1, Channel::Process), draw(2, 0, Channel::Process)];
+        let draws = [
+            draw(1, 0, Channel::Process),
+            draw(1, 0, Channel::Measurement),
+            draw(1, 1, Channel::Process),
+            draw(2, 0, Channel::Process),
+        ];
         assert!((0..4).all(|i| (0..i).all(|j| draws[i] != draws[j])));
     }
 }

@@ -35,29 +35,56 @@ pub struct Performance {
 }
 
 /// Measure a flight along `reference`.
-pub fn performance(description: &Description, reference: &Reference, flight: &Flight) -> Performance {
+pub fn performance(
+    description: &Description,
+    reference: &Reference,
+    flight: &Flight,
+) -> Performance {
     let trajectory = &flight.trajectory;
     let completed = flight.outcome == Outcome::Completed;
     let set_points = reference.set_points();
     let mut error = vec![0.0; description.states.len()];
     let steps: Vec<StepResponse> = (set_points.iter().enumerate())
         .map(|(k, set_point)| {
-            let start = trajectory.time_s.partition_point(|&t| t < set_point.time_s - 1e-9);
+            let start = trajectory
+                .time_s
+                .partition_point(|&t| t < set_point.time_s - 1e-9);
             let end = set_points
                 .get(k + 1)
-                .map_or(trajectory.time_s.len(), |next| trajectory.time_s.partition_point(|&t| t < next.time_s - 1e-9));
+                .map_or(trajectory.time_s.len(), |next| {
+                    trajectory
+                        .time_s
+                        .partition_point(|&t| t < next.time_s - 1e-9)
+                });
             let target = reference.at(set_point.time_s);
             let size = |sample: usize, error: &mut [f64]| {
                 description.state_error(&trajectory.states[sample], &target, error);
-                set_point.targets.iter().map(|&(state, _)| error[state].abs()).collect::<Vec<_>>()
+                set_point
+                    .targets
+                    .iter()
+                    .map(|&(state, _)| error[state].abs())
+                    .collect::<Vec<_>>()
             };
             let settled_at = (start < end && (completed || k + 1 < set_points.len())).then(|| {
                 let initial = size(start, &mut error);
-                let outside = |errors: Vec<f64>| errors.iter().zip(&initial).any(|(e, first)| *e > BAND * first);
-                (start..end).rev().find(|&sample| outside(size(sample, &mut error))).map_or(start, |last| last + 1)
+                let outside = |errors: Vec<f64>| {
+                    errors
+                        .iter()
+                        .zip(&initial)
+                        .any(|(e, first)| *e > BAND * first)
+                };
+                (start..end)
+                    .rev()
+                    .find(|&sample| outside(size(sample, &mut error)))
+                    .map_or(start, |last| last + 1)
             });
-            let settling_time_s = settled_at.filter(|&at| at < end).map(|at| trajectory.time_s[at] - set_point.time_s);
-            StepResponse { time_s: set_point.time_s, settling_time_s }
+            let settling_time_s = settled_at
+                .filter(|&at| at < end)
+                .map(|at| trajectory.time_s[at] - set_point.time_s);
+            StepResponse {
+                time_s: set_point.time_s,
+                settling_time_s,
+            }
         })
         .collect();
     let samples = trajectory.time_s.len().max(1) as f64;
@@ -70,13 +97,29 @@ pub fn performance(description: &Description, reference: &Reference, flight: &Fl
         actual_cost: trajectory.cost.last().copied().filter(|_| completed),
         settling_time_s,
         steps,
-        peak_input: trajectory.inputs.iter().flatten().copied().fold(f64::NEG_INFINITY, f64::max),
-        saturated_share: trajectory.saturated.iter().filter(|&&saturated| saturated).count() as f64 / samples,
+        peak_input: trajectory
+            .inputs
+            .iter()
+            .flatten()
+            .copied()
+            .fold(f64::NEG_INFINITY, f64::max),
+        saturated_share: trajectory
+            .saturated
+            .iter()
+            .filter(|&&saturated| saturated)
+            .count() as f64
+            / samples,
         peak_parameter_rate: description.scheduling.as_ref().map(|scheduling| {
             let rate = |pair: (&[Vec<f64>], &[f64])| {
-                (pair.0[1][scheduling.state] - pair.0[0][scheduling.state]).abs() / (pair.1[1] - pair.1[0])
+                (pair.0[1][scheduling.state] - pair.0[0][scheduling.state]).abs()
+                    / (pair.1[1] - pair.1[0])
             };
-            trajectory.states.windows(2).zip(trajectory.time_s.windows(2)).map(rate).fold(0.0, f64::max)
+            trajectory
+                .states
+                .windows(2)
+                .zip(trajectory.time_s.windows(2))
+                .map(rate)
+                .fold(0.0, f64::max)
         }),
     }
 }

@@ -149,9 +149,14 @@ pub fn design(
         Method::Lpvqr => map_grid(&model, |point| lpvqr::frozen(point, weights).inspect(count))?,
         Method::Slpvqr { gamma } => {
             let sigma = sigma()?;
-            map_grid(&model, |point| slpvqr::frozen(point, weights, &sigma, gamma).inspect(count))?
+            map_grid(&model, |point| {
+                slpvqr::frozen(point, weights, &sigma, gamma).inspect(count)
+            })?
         }
-        Method::HighGainSlpvqr { gamma, high_gain: options } => {
+        Method::HighGainSlpvqr {
+            gamma,
+            high_gain: options,
+        } => {
             let sigma = sigma()?;
             let segments = map_grid(&model, |point| {
                 let segment = high_gain::segment(point, weights, &sigma, gamma)?;
@@ -159,7 +164,10 @@ pub fn design(
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                 Ok((segment, s))
             })?;
-            let least = segments.iter().map(|&(_, s)| s).fold(f64::INFINITY, f64::min);
+            let least = segments
+                .iter()
+                .map(|&(_, s)| s)
+                .fold(f64::INFINITY, f64::min);
             (segments.into_iter().zip(&model.points))
                 .map(|((segment, _), point)| segment.into_design(point, weights, least))
                 .collect()
@@ -189,11 +197,18 @@ pub fn design(
 }
 
 /// σ of every input, or which input has none.
-fn symmetric_bound(limits: &InputLimits, operating_input: &[f64]) -> Result<Vec<f64>, SynthesisError> {
+fn symmetric_bound(
+    limits: &InputLimits,
+    operating_input: &[f64],
+) -> Result<Vec<f64>, SynthesisError> {
     let unlimited = || SynthesisError::UnlimitedInput {
-        input: (0..operating_input.len()).find(|&i| limits.min[i].is_none() && limits.max[i].is_none()).unwrap_or(0),
+        input: (0..operating_input.len())
+            .find(|&i| limits.min[i].is_none() && limits.max[i].is_none())
+            .unwrap_or(0),
     };
-    let sigma = limits.symmetric_bound(operating_input).ok_or_else(unlimited)?;
+    let sigma = limits
+        .symmetric_bound(operating_input)
+        .ok_or_else(unlimited)?;
     match sigma.iter().position(|&bound| bound <= 0.0) {
         Some(input) => Err(SynthesisError::UnlimitedInput { input }),
         None => Ok(sigma),
@@ -211,18 +226,25 @@ fn map_grid<T: Send>(
 
 fn schedule(model: &GridModel, points: &[FrozenDesign], kind: ScheduleKind) -> Schedule {
     let Some(scheduling) = model.scheduling.as_ref().filter(|_| points.len() > 1) else {
-        return Schedule::Constant { gain: points[0].gain.clone() };
+        return Schedule::Constant {
+            gain: points[0].gain.clone(),
+        };
     };
     let parameters: Vec<f64> = points.iter().map(|point| point.rho).collect();
     match kind {
         ScheduleKind::Grid => Schedule::Grid {
             parameters,
-            period: scheduling.periodic.then(|| scheduling.range[1] - scheduling.range[0]),
+            period: scheduling
+                .periodic
+                .then(|| scheduling.range[1] - scheduling.range[0]),
             gains: points.iter().map(|point| point.gain.clone()).collect(),
         },
         ScheduleKind::Vertices => {
             let weights = BoxWeights::new(&scheduling.features);
-            let (gains, _) = weights.fit(&parameters, &points.iter().map(|point| &point.gain).collect::<Vec<_>>());
+            let (gains, _) = weights.fit(
+                &parameters,
+                &points.iter().map(|point| &point.gain).collect::<Vec<_>>(),
+            );
             Schedule::Vertices { weights, gains }
         }
     }
@@ -238,7 +260,9 @@ pub enum DesignError {
     #[error("points: there has to be at least one")]
     NoPoints,
     /// A matrix of the wrong size.
-    #[error("{matrix} is {rows} × {columns}; for this plant it has to be {expected_rows} × {expected_columns}")]
+    #[error(
+        "{matrix} is {rows} × {columns}; for this plant it has to be {expected_rows} × {expected_columns}"
+    )]
     Shape {
         /// Which matrix.
         matrix: String,
@@ -306,7 +330,11 @@ impl Design {
         let mut gain_count = 1;
         match &self.controller.schedule {
             Schedule::Constant { gain } => shape("controller.schedule.gain", gain, m, n)?,
-            Schedule::Grid { parameters: grid, gains, .. } => {
+            Schedule::Grid {
+                parameters: grid,
+                gains,
+                ..
+            } => {
                 gain_count = grid.len();
                 equidistant(grid)?;
                 for (k, gain) in gains.iter().enumerate() {
@@ -326,11 +354,19 @@ impl Design {
             return Err(DesignError::NoPoints);
         }
         equidistant(&parameters)?;
-        length("controller.operating_input", self.controller.operating_input.len(), m)?;
+        length(
+            "controller.operating_input",
+            self.controller.operating_input.len(),
+            m,
+        )?;
         length("controller.limits.min", self.controller.limits.min.len(), m)?;
         length("controller.limits.max", self.controller.limits.max.len(), m)?;
         if let Some(state) = self.controller.scheduling_state.filter(|&state| state >= n) {
-            return Err(DesignError::Length { list: "controller.scheduling_state", length: state, expected: n });
+            return Err(DesignError::Length {
+                list: "controller.scheduling_state",
+                length: state,
+                expected: n,
+            });
         }
         if !(self.sample_time_s > 0.0 && self.sample_time_s.is_finite()) {
             return Err(DesignError::SampleTime(self.sample_time_s));
@@ -340,11 +376,24 @@ impl Design {
 }
 
 fn length(list: &'static str, length: usize, expected: usize) -> Result<(), DesignError> {
-    if length == expected { Ok(()) } else { Err(DesignError::Length { list, length, expected }) }
+    if length == expected {
+        Ok(())
+    } else {
+        Err(DesignError::Length {
+            list,
+            length,
+            expected,
+        })
+    }
 }
 
 fn equidistant(parameters: &[f64]) -> Result<(), DesignError> {
-    let steps: Vec<f64> = parameters.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let even = steps.iter().all(|step| *step > 0.0 && (step - steps[0]).abs() <= 1e-9 * steps[0]);
+    let steps: Vec<f64> = parameters
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .collect();
+    let even = steps
+        .iter()
+        .all(|step| *step > 0.0 && (step - steps[0]).abs() <= 1e-9 * steps[0]);
     if even { Ok(()) } else { Err(DesignError::Grid) }
 }

@@ -15,8 +15,12 @@ pub(super) struct InverseWeights {
 impl InverseWeights {
     /// The inverses of Q ≻ 0 and R ≻ 0. The caller has checked definiteness.
     pub fn new(weights: &super::CostWeights) -> Self {
-        let inverse = |m: &Mat<f64>| inverse_spd(m).expect("weights are checked to be positive definite");
-        Self { q: inverse(&weights.q), r: inverse(&weights.r) }
+        let inverse =
+            |m: &Mat<f64>| inverse_spd(m).expect("weights are checked to be positive definite");
+        Self {
+            q: inverse(&weights.q),
+            r: inverse(&weights.r),
+        }
     }
 }
 
@@ -29,12 +33,21 @@ impl InverseWeights {
 /// ```
 ///
 /// Equivalent to V̇ < −xᵀQx − uᵀRu for V = xᵀY⁻¹x under u = −LY⁻¹x.
-pub(super) fn performance(y: &Expr, l: &Expr, model: &FrozenModel, inverse: &InverseWeights) -> Expr {
+pub(super) fn performance(
+    y: &Expr,
+    l: &Expr,
+    model: &FrozenModel,
+    inverse: &InverseWeights,
+) -> Expr {
     let flow = &model.a * y - &model.b * l;
     Expr::symmetric_blocks(vec![
         vec![-(&flow + flow.t())],
         vec![y.clone(), Expr::constant(inverse.q.clone())],
-        vec![l.clone(), Expr::zeros(l.nrows(), y.ncols()), Expr::constant(inverse.r.clone())],
+        vec![
+            l.clone(),
+            Expr::zeros(l.nrows(), y.ncols()),
+            Expr::constant(inverse.r.clone()),
+        ],
     ])
 }
 
@@ -61,10 +74,17 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
                 .map(|(z, block)| (weight(z) / total, block.name.as_str()))
                 .collect();
             shares.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let carriers = shares.iter().take(3).map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
+            let carriers = shares
+                .iter()
+                .take(3)
+                .map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share))
+                .collect();
             Err(SynthesisError::Infeasible { rho, carriers })
         }
         Outcome::Unbounded(_) => Err(SynthesisError::Unbounded { rho }),
-        Outcome::Inaccurate(reason) => Err(SynthesisError::Inaccurate { rho, reason: format!("{reason:?}") }),
+        Outcome::Inaccurate(reason) => Err(SynthesisError::Inaccurate {
+            rho,
+            reason: format!("{reason:?}"),
+        }),
     }
 }

@@ -27,7 +27,10 @@ pub fn lqr_by_inequality(
     let mut problem = Problem::new();
     let y = problem.symmetric("Y", n);
     let l = problem.rectangular("L", m, n);
-    problem.positive_definite("performance", performance(&y, &l, model, &InverseWeights::new(weights)));
+    problem.positive_definite(
+        "performance",
+        performance(&y, &l, model, &InverseWeights::new(weights)),
+    );
     problem.maximize(&y.trace());
     let answer = solve(&problem, model.rho)?;
     Ok((answer.value(&y), answer.value(&l), answer.iterations.len()))
@@ -35,11 +38,20 @@ pub fn lqr_by_inequality(
 
 /// Theorem 4.5 at one parameter value. The inequality's optimum is the Riccati solution, which gives the gain; the two
 /// are both computed, and how far their traces differ is kept in the result.
-pub(super) fn frozen(model: &FrozenModel, weights: &CostWeights) -> Result<FrozenDesign, SynthesisError> {
+pub(super) fn frozen(
+    model: &FrozenModel,
+    weights: &CostWeights,
+) -> Result<FrozenDesign, SynthesisError> {
     let (y_inequality, _, iterations) = lqr_by_inequality(model, weights)?;
-    let q = Mat::from_fn(weights.q.nrows(), weights.q.ncols(), |i, j| (1.0 + STRICTNESS) * weights.q[(i, j)]);
-    let regulator = riccati::solve(&model.a, &model.b, &q, &weights.r)
-        .map_err(|source| SynthesisError::Riccati { rho: model.rho, source })?;
+    let q = Mat::from_fn(weights.q.nrows(), weights.q.ncols(), |i, j| {
+        (1.0 + STRICTNESS) * weights.q[(i, j)]
+    });
+    let regulator = riccati::solve(&model.a, &model.b, &q, &weights.r).map_err(|source| {
+        SynthesisError::Riccati {
+            rho: model.rho,
+            source,
+        }
+    })?;
     let y = inverse_spd(&regulator.p).ok_or(SynthesisError::Unbounded { rho: model.rho })?;
     let trace_y = trace(&y);
     Ok(FrozenDesign {

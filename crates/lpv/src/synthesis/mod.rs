@@ -18,7 +18,9 @@ mod lpvqr;
 mod region;
 mod slpvqr;
 
-pub use design::{CostWeights, Design, DesignError, DesignRequest, FrozenDesign, Method, ScheduleKind, design};
+pub use design::{
+    CostWeights, Design, DesignError, DesignRequest, FrozenDesign, Method, ScheduleKind, design,
+};
 pub use high_gain::HighGainOptions;
 pub use lpvqr::{STRICTNESS, lqr_by_inequality};
 pub use region::covering_level;
@@ -43,13 +45,17 @@ pub enum SynthesisError {
         carriers: Vec<String>,
     },
     /// The objective is not bounded.
-    #[error("tr Y is unbounded at parameter {rho:.6}: some state costs nothing; give it a positive weight in Q")]
+    #[error(
+        "tr Y is unbounded at parameter {rho:.6}: some state costs nothing; give it a positive weight in Q"
+    )]
     Unbounded {
         /// Parameter value.
         rho: f64,
     },
     /// The solver stopped short of the accuracy asked for.
-    #[error("the solver stopped short at parameter {rho:.6} ({reason}); try weights of less different size")]
+    #[error(
+        "the solver stopped short at parameter {rho:.6} ({reason}); try weights of less different size"
+    )]
     Inaccurate {
         /// Parameter value.
         rho: f64,
@@ -66,7 +72,9 @@ pub enum SynthesisError {
         input: usize,
     },
     /// No gain on the high-gain segment is stable at the controller's sample time.
-    #[error("no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster")]
+    #[error(
+        "no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster"
+    )]
     SampleTime {
         /// Parameter value.
         rho: f64,

@@ -1,0 +1,8 @@
+//! Integration tests of the library: the mathematics against the thesis, closed forms and residuals.
+
+mod closed_loop;
+mod filter;
+mod jacobians;
+mod layering;
+mod quadrotor;
+mod synthesis;
