@@ -6,8 +6,7 @@ use std::io::BufReader;
 use std::time::Instant;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let (flags, paths): (Vec<String>, Vec<String>) =
-        std::env::args().skip(1).partition(|a| a.starts_with("--"));
+    let (flags, paths): (Vec<String>, Vec<String>) = std::env::args().skip(1).partition(|a| a.starts_with("--"));
     for path in paths {
         let started = Instant::now();
         let problem = lmi::sdpa::read(BufReader::new(File::open(&path)?))?;
@@ -29,11 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let outcome = format!("{:?}", answer.outcome);
         let outcome = outcome.split('{').next().unwrap_or_default();
-        let smallest = answer
-            .blocks
-            .iter()
-            .map(|block| block.smallest_eigenvalue)
-            .fold(f64::INFINITY, f64::min);
+        let smallest = answer.blocks.iter().map(|block| block.smallest_eigenvalue).fold(f64::INFINITY, f64::min);
         println!(
             "{path}: {outcome}, objective {:.9e}, dual {:.9e}, gap {:.1e}, residuals {:.1e} {:.1e}, smallest eigenvalue {smallest:.1e}, \
              {} iterations, {:.3} s",

@@ -84,7 +84,8 @@ pub struct Residuals {
     pub primal: f64,
     /// ‖c − A(Z)‖ / (1 + ‖c‖) in the largest absolute entry, `A(Z)ᵢ = Σ_b⟨F_{b,i}, Z_b⟩`.
     pub dual: f64,
-    /// |p − d| / (1 + |p| + |d|) for the objective p and the dual objective d.
+    /// max(|p − d|, Σ|cᵢ − A(Z)ᵢ||xᵢ|) / (1 + |p| + |d|) for the objective p and the dual objective d: the second term is what the dual
+    /// residual may take from the bound d.
     pub gap: f64,
 }
 
@@ -158,13 +159,10 @@ impl Answer {
 }
 
 /// Matrices as lists of rows.
-fn nested_rows<S: serde::Serializer>(
-    matrices: &[Mat<f64>],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(matrices.iter().map(|m| -> Vec<Vec<f64>> {
-        (0..m.nrows())
-            .map(|i| (0..m.ncols()).map(|j| m[(i, j)]).collect())
-            .collect()
-    }))
+fn nested_rows<S: serde::Serializer>(matrices: &[Mat<f64>], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(
+        matrices.iter().map(|m| -> Vec<Vec<f64>> {
+            (0..m.nrows()).map(|i| (0..m.ncols()).map(|j| m[(i, j)]).collect()).collect()
+        }),
+    )
 }

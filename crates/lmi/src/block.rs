@@ -86,11 +86,7 @@ impl Block {
             Self::Dense(block) => OperatorScratch {
                 factored: block.factored.scratch(),
                 sparse: block.sparse.scratch(),
-                mixed: if block.factored.is_empty() || block.sparse.is_empty() {
-                    vec![]
-                } else {
-                    vec![0.0; unknowns]
-                },
+                mixed: if block.factored.is_empty() || block.sparse.is_empty() { vec![] } else { vec![0.0; unknowns] },
             },
             Self::Diagonal(_) => OperatorScratch::default(),
         }
@@ -105,10 +101,7 @@ impl Block {
             }
             Self::Diagonal(block) => {
                 for (out, row) in out.iter_mut().zip(&block.rows) {
-                    *out += row
-                        .iter()
-                        .map(|&(unknown, value)| value * x[unknown])
-                        .sum::<f64>();
+                    *out += row.iter().map(|&(unknown, value)| value * x[unknown]).sum::<f64>();
                 }
             }
         }
@@ -118,74 +111,72 @@ impl Block {
     pub fn adjoint(&self, factor: f64, h: &[f64], out: &mut [f64], scratch: &mut OperatorScratch) {
         match self {
             Self::Dense(block) => {
-                block
-                    .factored
-                    .adjoint(factor, h, out, &mut scratch.factored);
+                block.factored.adjoint(factor, h, out, &mut scratch.factored);
                 block.sparse.adjoint(factor, h, out);
             }
             Self::Diagonal(block) => {
                 for (h, row) in h.iter().zip(&block.rows) {
-                    row.iter()
-                        .for_each(|&(unknown, value)| out[unknown] += factor * value * h);
+                    row.iter().for_each(|&(unknown, value)| out[unknown] += factor * value * h);
                 }
             }
         }
     }
 
-    /// out_i ← max(out_i, ‖F_i‖_F), the norm estimated for factored blocks.
-    pub fn norms(&self, out: &mut [f64]) {
+    /// out_i ← max(out_i, ‖D F_i D‖_F) for a diagonal D, the norm estimated for factored blocks.
+    pub fn norms(&self, d: &[f64], out: &mut [f64]) {
         match self {
             Self::Dense(block) => {
-                block.factored.norms(out);
-                block.sparse.norms(out);
+                block.factored.norms(d, out);
+                block.sparse.norms(d, out);
             }
             Self::Diagonal(block) => {
                 let mut squares = vec![0.0; out.len()];
-                for &(unknown, value) in block.rows.iter().flatten() {
-                    squares[unknown] += value * value;
+                for (row, d) in block.rows.iter().zip(d) {
+                    row.iter().for_each(|&(unknown, value)| squares[unknown] += (value * d * d).powi(2));
                 }
-                out.iter_mut()
-                    .zip(squares)
-                    .for_each(|(out, square)| *out = out.max(square.sqrt()));
+                out.iter_mut().zip(squares).for_each(|(out, square)| *out = out.max(square.sqrt()));
             }
         }
     }
 
-    /// M ← M + tr(F_i P F_j Z), lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
-    pub fn schur(
-        &self,
-        p: &[f64],
-        z: &[f64],
-        m: &mut [f64],
-        unknowns: usize,
-        scratch: &mut OperatorScratch,
-    ) {
+    /// The largest absolute value that each entry has in C and all F_i (estimated for factored blocks), symmetric,
+    /// in the block's storage.
+    pub fn magnitudes(&self) -> Vec<f64> {
+        let mut out: Vec<f64> = self.constant().iter().map(|c| c.abs()).collect();
         match self {
             Self::Dense(block) => {
-                let OperatorScratch {
-                    factored,
-                    sparse,
-                    mixed,
-                } = scratch;
+                block.factored.magnitudes(&mut out);
+                block.sparse.magnitudes(&mut out);
+            }
+            Self::Diagonal(block) => {
+                for (out, row) in out.iter_mut().zip(&block.rows) {
+                    *out = row.iter().fold(*out, |m, (_, value)| m.max(value.abs()));
+                }
+            }
+        }
+        out
+    }
+
+    /// M ← M + tr(F_i P F_j Z), lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
+    pub fn schur(&self, p: &[f64], z: &[f64], m: &mut [f64], unknowns: usize, scratch: &mut OperatorScratch) {
+        match self {
+            Self::Dense(block) => {
+                let OperatorScratch { factored, sparse, mixed } = scratch;
                 if !block.factored.is_empty() {
                     block.factored.schur(p, z, m, unknowns, factored);
                 }
-                let both = !block.factored.is_empty();
-                block
-                    .sparse
-                    .schur(p, z, m, unknowns, sparse, both, |unknown, h, m| {
-                        mixed.fill(0.0);
-                        block.factored.adjoint(1.0, h, mixed, factored);
-                        for (other, value) in mixed.iter().enumerate() {
-                            // An unknown with both a sparse and a factored part meets itself from both sides.
-                            let value = if other == unknown {
-                                2.0 * value
-                            } else {
-                                *value
-                            };
-                            m[other.max(unknown) + other.min(unknown) * unknowns] += value;
-                        }
-                    });
+                let mut meet_factored = |unknown: usize, h: &[f64], m: &mut [f64]| {
+                    mixed.fill(0.0);
+                    block.factored.adjoint(1.0, h, mixed, factored);
+                    for (other, value) in mixed.iter().enumerate() {
+                        // An unknown with both a sparse and a factored part meets itself from both sides.
+                        let value = if other == unknown { 2.0 * value } else { *value };
+                        m[other.max(unknown) + other.min(unknown) * unknowns] += value;
+                    }
+                };
+                let alone = block.factored.is_empty();
+                let mixed = (!alone).then_some(&mut meet_factored as crate::sparse::Mixed<'_>);
+                block.sparse.schur(p, z, m, unknowns, sparse, mixed);
             }
             Self::Diagonal(block) => {
                 for ((p, z), row) in p.iter().zip(z).zip(&block.rows) {

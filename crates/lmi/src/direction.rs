@@ -40,26 +40,27 @@ pub(crate) struct BlockState {
 }
 
 impl BlockState {
-    /// S = ηI, Z = ξI.
-    pub fn new(block: &Block, unknowns: usize, eta: f64, xi: f64) -> Self {
+    /// Diagonal S and Z.
+    pub fn new(block: &Block, unknowns: usize, s: &[f64], z: &[f64]) -> Self {
         let n = block.size();
         let diagonal = block.is_diagonal();
         let len = block.constant().len();
-        let identity = |value: f64| {
-            let mut m = vec![if diagonal { value } else { 0.0 }; len];
-            if !diagonal {
-                (0..n).for_each(|i| m[i + i * n] = value);
+        let matrix = |entry: &dyn Fn(usize) -> f64| {
+            if diagonal {
+                return (0..n).map(entry).collect();
             }
+            let mut m = vec![0.0; len];
+            (0..n).for_each(|i| m[i + i * n] = entry(i));
             m
         };
         let zero = || vec![0.0; len];
         Self {
             n,
             diagonal,
-            s: identity(eta),
-            z: identity(xi),
-            s_factor: identity(eta.sqrt()),
-            z_factor: identity(xi.sqrt()),
+            s: matrix(&|i| s[i]),
+            z: matrix(&|i| z[i]),
+            s_factor: matrix(&|i| s[i].sqrt()),
+            z_factor: matrix(&|i| z[i].sqrt()),
             s_inverse: zero(),
             z_inverse: zero(),
             residual: zero(),
@@ -77,19 +78,12 @@ impl BlockState {
     pub fn update_residual(&mut self, block: &Block, x: &[f64]) {
         self.residual.copy_from_slice(block.constant());
         block.apply(x, &mut self.residual, &mut self.operator);
-        self.residual
-            .iter_mut()
-            .zip(&self.s)
-            .for_each(|(r, s)| *r -= s);
+        self.residual.iter_mut().zip(&self.s).for_each(|(r, s)| *r -= s);
     }
 
     /// Replaces S by F(x) = S + R when that is positive definite; the residual is then zero.
     pub fn close_residual(&mut self, scratch: &mut Scratch) -> bool {
-        self.work
-            .iter_mut()
-            .zip(&self.s)
-            .zip(&self.residual)
-            .for_each(|((w, s), r)| *w = s + r);
+        self.work.iter_mut().zip(&self.s).zip(&self.residual).for_each(|((w, s), r)| *w = s + r);
         self.s_factor.copy_from_slice(&self.work);
         let done = factorize(self.diagonal, self.n, &mut self.s_factor, scratch);
         if done {
@@ -105,14 +99,8 @@ impl BlockState {
     /// The inverses of S and Z from their factors.
     pub fn invert(&mut self, scratch: &mut Scratch) {
         if self.diagonal {
-            self.s_inverse
-                .iter_mut()
-                .zip(&self.s)
-                .for_each(|(p, s)| *p = 1.0 / s);
-            self.z_inverse
-                .iter_mut()
-                .zip(&self.z)
-                .for_each(|(p, z)| *p = 1.0 / z);
+            self.s_inverse.iter_mut().zip(&self.s).for_each(|(p, s)| *p = 1.0 / s);
+            self.z_inverse.iter_mut().zip(&self.z).for_each(|(p, z)| *p = 1.0 / z);
             return;
         }
         dense::inverse_from_factor(self.n, &self.s_factor, &mut self.s_inverse, scratch);
@@ -126,13 +114,7 @@ impl BlockState {
             return;
         }
         if self.diagonal {
-            for (((g, p), r), z) in self
-                .g
-                .iter_mut()
-                .zip(&self.s_inverse)
-                .zip(&self.residual)
-                .zip(&self.z)
-            {
+            for (((g, p), r), z) in self.g.iter_mut().zip(&self.s_inverse).zip(&self.residual).zip(&self.z) {
                 *g = -p * r * z;
             }
             return;
@@ -181,21 +163,14 @@ impl BlockState {
             *dz = g - z - *dz;
         }
         if !feasible {
-            self.ds
-                .iter_mut()
-                .zip(&self.residual)
-                .for_each(|(ds, r)| *ds += r);
+            self.ds.iter_mut().zip(&self.residual).for_each(|(ds, r)| *ds += r);
             dense::multiply(self.n, &self.s_inverse, &self.ds, &mut self.p_ds);
         }
     }
 
     /// out ← out − A(Z + dZ).
     pub fn subtract_dual(&mut self, block: &Block, out: &mut [f64]) {
-        self.work
-            .iter_mut()
-            .zip(&self.z)
-            .zip(&self.dz)
-            .for_each(|((w, z), dz)| *w = z + dz);
+        self.work.iter_mut().zip(&self.z).zip(&self.dz).for_each(|((w, z), dz)| *w = z + dz);
         block.adjoint(-1.0, &self.work, out, &mut self.operator);
     }
 
@@ -238,11 +213,7 @@ impl BlockState {
     pub fn longest_steps(&self, lanczos: &mut Lanczos, accuracy: f64) -> (f64, f64) {
         if self.diagonal {
             let ratio = |value: &[f64], step: &[f64]| {
-                let ends = value
-                    .iter()
-                    .zip(step)
-                    .filter(|(_, step)| **step < 0.0)
-                    .map(|(v, d)| -v / d);
+                let ends = value.iter().zip(step).filter(|(_, step)| **step < 0.0).map(|(v, d)| -v / d);
                 ends.fold(f64::INFINITY, f64::min)
             };
             return (ratio(&self.s, &self.ds), ratio(&self.z, &self.dz));

@@ -20,9 +20,7 @@ pub enum Error {
         value: f64,
     },
     /// The left side of an inequality is not square.
-    #[error(
-        "inequality \"{name}\" is {rows} × {columns}: a square, symmetric expression is needed"
-    )]
+    #[error("inequality \"{name}\" is {rows} × {columns}: a square, symmetric expression is needed")]
     NotSquare {
         /// The inequality.
         name: String,
@@ -55,9 +53,7 @@ pub enum Error {
         columns: usize,
     },
     /// An expression holds an unknown of another problem.
-    #[error(
-        "{place} holds an unknown of another problem: make all unknowns with the problem that is solved"
-    )]
+    #[error("{place} holds an unknown of another problem: make all unknowns with the problem that is solved")]
     ForeignUnknown {
         /// The inequality or objective.
         place: String,

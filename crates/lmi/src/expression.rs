@@ -23,11 +23,7 @@ pub(crate) struct Unknown {
 #[derive(Clone, Debug)]
 pub(crate) enum Shape {
     /// `left · X · right`, or `left · Xᵀ · right`.
-    Product {
-        left: Mat<f64>,
-        transposed: bool,
-        right: Mat<f64>,
-    },
+    Product { left: Mat<f64>, transposed: bool, right: Mat<f64> },
     /// `⟨weights, X⟩ · matrix`.
     Scaled { weights: Mat<f64>, matrix: Mat<f64> },
 }
@@ -122,13 +118,8 @@ impl Expr {
     /// When the rows differ in their number of blocks, or a block's size differs from the first one in its row
     /// or column.
     pub fn blocks(rows: Vec<Vec<Expr>>) -> Self {
-        let heights: Vec<usize> = rows
-            .iter()
-            .map(|row| row.first().map_or(0, Expr::nrows))
-            .collect();
-        let widths: Vec<usize> = rows
-            .first()
-            .map_or(Vec::new(), |row| row.iter().map(Expr::ncols).collect());
+        let heights: Vec<usize> = rows.iter().map(|row| row.first().map_or(0, Expr::nrows)).collect();
+        let widths: Vec<usize> = rows.first().map_or(Vec::new(), |row| row.iter().map(Expr::ncols).collect());
         let (tops, lefts) = (starts(&heights), starts(&widths));
         let mut out = Accumulator::new(heights.iter().sum(), widths.iter().sum());
         for (i, row) in rows.iter().enumerate() {
@@ -159,10 +150,7 @@ impl Expr {
 
     /// The transpose.
     pub fn t(&self) -> Self {
-        let terms = self.terms.iter().map(|term| Term {
-            unknown: term.unknown,
-            shape: term.transposed_shape(),
-        });
+        let terms = self.terms.iter().map(|term| Term { unknown: term.unknown, shape: term.transposed_shape() });
         Self::new(self.constant.transpose().to_owned(), terms.collect())
     }
 
@@ -183,25 +171,11 @@ impl Expr {
         let terms = self.terms.iter().map(|term| {
             let weights = match &term.shape {
                 // tr(U X V) = ⟨(V U)ᵀ, X⟩ and tr(U Xᵀ V) = ⟨V U, X⟩.
-                Shape::Product {
-                    left,
-                    transposed: false,
-                    right,
-                } => (right * left).transpose().to_owned(),
-                Shape::Product {
-                    left,
-                    transposed: true,
-                    right,
-                } => right * left,
+                Shape::Product { left, transposed: false, right } => (right * left).transpose().to_owned(),
+                Shape::Product { left, transposed: true, right } => right * left,
                 Shape::Scaled { weights, matrix } => trace(matrix) * weights,
             };
-            Term {
-                unknown: term.unknown,
-                shape: Shape::Scaled {
-                    weights,
-                    matrix: one(),
-                },
-            }
+            Term { unknown: term.unknown, shape: Shape::Scaled { weights, matrix: one() } }
         });
         Self::new(trace(&self.constant) * one(), terms.collect())
     }
@@ -261,34 +235,17 @@ impl Expr {
         );
         let terms = self.terms.iter().map(|term| {
             let (weights, factor) = match &term.shape {
-                Shape::Product {
-                    left,
-                    transposed: false,
-                    right,
-                } => ((right * left).transpose().to_owned(), 1.0),
-                Shape::Product {
-                    left,
-                    transposed: true,
-                    right,
-                } => (right * left, 1.0),
+                Shape::Product { left, transposed: false, right } => ((right * left).transpose().to_owned(), 1.0),
+                Shape::Product { left, transposed: true, right } => (right * left, 1.0),
                 Shape::Scaled { weights, matrix } => (weights.clone(), matrix[(0, 0)]),
             };
-            Term {
-                unknown: term.unknown,
-                shape: Shape::Scaled {
-                    weights,
-                    matrix: factor * matrix,
-                },
-            }
+            Term { unknown: term.unknown, shape: Shape::Scaled { weights, matrix: factor * matrix } }
         });
         Self::new(self.constant[(0, 0)] * matrix, terms.collect())
     }
 
     pub(crate) fn new(constant: Mat<f64>, terms: Vec<Term>) -> Self {
-        Self {
-            constant: Arc::new(constant),
-            terms: Arc::new(terms),
-        }
+        Self { constant: Arc::new(constant), terms: Arc::new(terms) }
     }
 
     pub(crate) fn unknown(unknown: Unknown) -> Self {
@@ -297,34 +254,19 @@ impl Expr {
             transposed: false,
             right: Mat::identity(unknown.cols, unknown.cols),
         };
-        Self::new(
-            Mat::zeros(unknown.rows, unknown.cols),
-            vec![Term { unknown, shape }],
-        )
+        Self::new(Mat::zeros(unknown.rows, unknown.cols), vec![Term { unknown, shape }])
     }
 
     /// Applies a map that is linear in the rows (a product from the left) to every part.
     pub(crate) fn map_left(&self, map: &dyn Fn(&Mat<f64>) -> Mat<f64>) -> Self {
         let terms = self.terms.iter().map(|term| {
             let shape = match &term.shape {
-                Shape::Product {
-                    left,
-                    transposed,
-                    right,
-                } => Shape::Product {
-                    left: map(left),
-                    transposed: *transposed,
-                    right: right.clone(),
-                },
-                Shape::Scaled { weights, matrix } => Shape::Scaled {
-                    weights: weights.clone(),
-                    matrix: map(matrix),
-                },
+                Shape::Product { left, transposed, right } => {
+                    Shape::Product { left: map(left), transposed: *transposed, right: right.clone() }
+                }
+                Shape::Scaled { weights, matrix } => Shape::Scaled { weights: weights.clone(), matrix: map(matrix) },
             };
-            Term {
-                unknown: term.unknown,
-                shape,
-            }
+            Term { unknown: term.unknown, shape }
         });
         Self::new(map(&self.constant), terms.collect())
     }
@@ -333,24 +275,12 @@ impl Expr {
     pub(crate) fn map_right(&self, map: &dyn Fn(&Mat<f64>) -> Mat<f64>) -> Self {
         let terms = self.terms.iter().map(|term| {
             let shape = match &term.shape {
-                Shape::Product {
-                    left,
-                    transposed,
-                    right,
-                } => Shape::Product {
-                    left: left.clone(),
-                    transposed: *transposed,
-                    right: map(right),
-                },
-                Shape::Scaled { weights, matrix } => Shape::Scaled {
-                    weights: weights.clone(),
-                    matrix: map(matrix),
-                },
+                Shape::Product { left, transposed, right } => {
+                    Shape::Product { left: left.clone(), transposed: *transposed, right: map(right) }
+                }
+                Shape::Scaled { weights, matrix } => Shape::Scaled { weights: weights.clone(), matrix: map(matrix) },
             };
-            Term {
-                unknown: term.unknown,
-                shape,
-            }
+            Term { unknown: term.unknown, shape }
         });
         Self::new(map(&self.constant), terms.collect())
     }
@@ -369,36 +299,23 @@ impl Term {
     /// The value of the term at X = `x`.
     pub(crate) fn evaluate(&self, x: &Mat<f64>) -> Mat<f64> {
         match &self.shape {
-            Shape::Product {
-                left,
-                transposed: false,
-                right,
-            } => left * x * right,
-            Shape::Product {
-                left,
-                transposed: true,
-                right,
-            } => left * x.transpose() * right,
+            Shape::Product { left, transposed: false, right } => left * x * right,
+            Shape::Product { left, transposed: true, right } => left * x.transpose() * right,
             Shape::Scaled { weights, matrix } => inner_product(weights, x) * matrix,
         }
     }
 
     fn transposed_shape(&self) -> Shape {
         match &self.shape {
-            Shape::Product {
-                left,
-                transposed,
-                right,
-            } => Shape::Product {
+            Shape::Product { left, transposed, right } => Shape::Product {
                 left: right.transpose().to_owned(),
                 // A symmetric unknown is its own transpose; one form for it lets equal terms be recognised.
                 transposed: !transposed && !self.unknown.symmetric,
                 right: left.transpose().to_owned(),
             },
-            Shape::Scaled { weights, matrix } => Shape::Scaled {
-                weights: weights.clone(),
-                matrix: matrix.transpose().to_owned(),
-            },
+            Shape::Scaled { weights, matrix } => {
+                Shape::Scaled { weights: weights.clone(), matrix: matrix.transpose().to_owned() }
+            }
         }
     }
 }
@@ -423,10 +340,7 @@ struct Accumulator {
 
 impl Accumulator {
     fn new(rows: usize, cols: usize) -> Self {
-        Self {
-            constant: Mat::zeros(rows, cols),
-            terms: Vec::new(),
-        }
+        Self { constant: Mat::zeros(rows, cols), terms: Vec::new() }
     }
 
     fn place(&mut self, block: &Expr, top: usize, left: usize) {
@@ -442,29 +356,17 @@ impl Accumulator {
             out.submatrix_mut(0, left, m.nrows(), width).copy_from(m);
             out
         };
-        self.constant
-            .submatrix_mut(top, left, height, width)
-            .copy_from(&*block.constant);
+        self.constant.submatrix_mut(top, left, height, width).copy_from(&*block.constant);
         for term in block.terms.iter() {
             let shape = match &term.shape {
-                Shape::Product {
-                    left,
-                    transposed,
-                    right,
-                } => Shape::Product {
-                    left: deep(left),
-                    transposed: *transposed,
-                    right: wide(right),
-                },
-                Shape::Scaled { weights, matrix } => Shape::Scaled {
-                    weights: weights.clone(),
-                    matrix: wide(&deep(matrix)),
-                },
+                Shape::Product { left, transposed, right } => {
+                    Shape::Product { left: deep(left), transposed: *transposed, right: wide(right) }
+                }
+                Shape::Scaled { weights, matrix } => {
+                    Shape::Scaled { weights: weights.clone(), matrix: wide(&deep(matrix)) }
+                }
             };
-            self.terms.push(Term {
-                unknown: term.unknown,
-                shape,
-            });
+            self.terms.push(Term { unknown: term.unknown, shape });
         }
     }
 
@@ -499,7 +401,5 @@ fn trace(m: &Mat<f64>) -> f64 {
 
 /// ⟨a, b⟩ = Σ aᵢⱼ bᵢⱼ.
 pub(crate) fn inner_product(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
-    (0..a.ncols())
-        .map(|j| (0..a.nrows()).map(|i| a[(i, j)] * b[(i, j)]).sum::<f64>())
-        .sum()
+    (0..a.ncols()).map(|j| (0..a.nrows()).map(|i| a[(i, j)] * b[(i, j)]).sum::<f64>()).sum()
 }

@@ -11,6 +11,8 @@
 //! whatever the size of the block.
 
 use crate::dense::axpy;
+use crate::vectorized::vectorized;
+use std::collections::HashMap;
 
 /// One stack before compilation: columns of U and V, and for entry (r, s) of X the scalar unknown `positions[r·|V| + s]`.
 #[derive(Debug)]
@@ -32,13 +34,7 @@ impl Columns {
         if self.starts.is_empty() {
             self.starts.push(0);
         }
-        self.entries.extend(
-            column
-                .iter()
-                .copied()
-                .enumerate()
-                .filter(|(_, value)| *value != 0.0),
-        );
+        self.entries.extend(column.iter().copied().enumerate().filter(|(_, value)| *value != 0.0));
         self.starts.push(self.entries.len());
     }
 
@@ -59,8 +55,33 @@ struct Group {
     v: usize,
     cols: usize,
     positions: Vec<usize>,
-    /// Largest position in each row of X: rows that end before the row of M in hand are skipped.
-    last: Vec<usize>,
+    places: Vec<Places>,
+}
+
+/// Where the entries of one row of X stand among the unknowns.
+#[derive(Clone, Copy, Debug)]
+enum Places {
+    /// One after the other, from here.
+    Run(usize),
+    /// Anywhere up to here.
+    Scattered(usize),
+}
+
+impl Places {
+    fn of(positions: &[usize]) -> Self {
+        let first = positions[0];
+        if positions.iter().enumerate().all(|(s, &position)| position == first + s) {
+            return Self::Run(first);
+        }
+        Self::Scattered(positions.iter().copied().max().unwrap_or(first))
+    }
+
+    fn last(self, cols: usize) -> usize {
+        match self {
+            Self::Run(first) => first + cols - 1,
+            Self::Scattered(last) => last,
+        }
+    }
 }
 
 /// A row of the Schur complement that a group contributes to: the entries of X that are one scalar unknown
@@ -82,13 +103,19 @@ pub(crate) struct Factored {
     rows: Vec<Row>,
 }
 
+/// Rows are padded to a multiple of this, at least the widest vector register.
+const PADDING: usize = 8;
+
 /// Scratch memory of one block's factored part, reused in every iteration.
 #[derive(Debug, Default)]
 pub(crate) struct FactoredScratch {
     product: Vec<f64>,
     wpw: Vec<f64>,
     wzw: Vec<f64>,
-    row: Vec<f64>,
+    /// The two sides of a sum of outer products, and the sum.
+    factors: Vec<f64>,
+    lines: Vec<f64>,
+    sum: Vec<f64>,
 }
 
 impl Factored {
@@ -101,38 +128,22 @@ impl Factored {
             stack.u.iter().for_each(|column| w.push(column));
             let (v, cols) = (w.len(), stack.v.len());
             stack.v.iter().for_each(|column| w.push(column));
-            let first = rows.len();
+            let mut seen: HashMap<usize, usize> = HashMap::new();
             for (at, &position) in stack.positions.iter().enumerate() {
                 let entry = (at / cols, at % cols);
-                match rows[first..]
-                    .iter_mut()
-                    .find(|row| row.position == position && row.count == 1)
-                {
-                    Some(row) => {
-                        row.entries[1] = entry;
-                        row.count = 2;
+                match seen.get(&position) {
+                    Some(&row) => {
+                        rows[row].entries[1] = entry;
+                        rows[row].count = 2;
                     }
-                    None => rows.push(Row {
-                        position,
-                        group: groups.len(),
-                        entries: [entry; 2],
-                        count: 1,
-                    }),
+                    None => {
+                        seen.insert(position, rows.len());
+                        rows.push(Row { position, group: groups.len(), entries: [entry; 2], count: 1 });
+                    }
                 }
             }
-            let last = stack
-                .positions
-                .chunks(cols)
-                .map(|c| c.iter().copied().max().unwrap_or(0))
-                .collect();
-            groups.push(Group {
-                u,
-                rows: count,
-                v,
-                cols,
-                positions: stack.positions,
-                last,
-            });
+            let places = stack.positions.chunks(cols).map(Places::of).collect();
+            groups.push(Group { u, rows: count, v, cols, positions: stack.positions, places });
         }
         Self { n, w, groups, rows }
     }
@@ -143,84 +154,40 @@ impl Factored {
 
     pub fn scratch(&self) -> FactoredScratch {
         let w = self.w.len();
-        let longest = self
-            .groups
-            .iter()
-            .map(|g| g.positions.len())
-            .max()
-            .unwrap_or(0);
+        let rows = self.groups.iter().map(|g| g.rows).max().unwrap_or(0);
+        let cols = self.groups.iter().map(|g| g.cols.next_multiple_of(PADDING)).max().unwrap_or(0);
         FactoredScratch {
             product: vec![0.0; self.n * w],
             wpw: vec![0.0; w * w],
             wzw: vec![0.0; w * w],
-            row: vec![0.0; longest],
+            factors: vec![0.0; 8 * rows],
+            lines: vec![0.0; 8 * cols],
+            sum: vec![0.0; rows * cols],
         }
     }
 
     /// out ← out + F(x) − F(0).
     pub fn apply(&self, x: &[f64], out: &mut [f64], scratch: &mut FactoredScratch) {
-        let n = self.n;
         for group in &self.groups {
-            let t = &mut scratch.product[..n * group.cols];
-            t.fill(0.0);
-            for r in 0..group.rows {
-                for &(i, value) in self.w.column(group.u + r) {
-                    for (s, position) in group.positions[r * group.cols..][..group.cols]
-                        .iter()
-                        .enumerate()
-                    {
-                        t[i + s * n] += value * x[*position];
-                    }
-                }
-            }
-            for (s, t) in t.chunks_exact(n).enumerate() {
-                for &(i, value) in self.w.column(group.v + s) {
-                    axpy(value, t, &mut out[i * n..(i + 1) * n]);
-                    for (k, t) in t.iter().enumerate() {
-                        out[i + k * n] += value * t;
-                    }
-                }
-            }
+            apply(self.n, &self.w, group, x, &mut scratch.product, out);
         }
     }
 
     /// out_i ← out_i + factor·⟨F_i, H⟩ for symmetric H.
     pub fn adjoint(&self, factor: f64, h: &[f64], out: &mut [f64], scratch: &mut FactoredScratch) {
-        let n = self.n;
         for group in &self.groups {
-            let hv = &mut scratch.product[..n];
-            for s in 0..group.cols {
-                hv.fill(0.0);
-                for &(i, value) in self.w.column(group.v + s) {
-                    axpy(2.0 * factor * value, &h[i * n..(i + 1) * n], hv);
-                }
-                for r in 0..group.rows {
-                    let inner: f64 = self
-                        .w
-                        .column(group.u + r)
-                        .iter()
-                        .map(|&(i, value)| value * hv[i])
-                        .sum();
-                    out[group.positions[r * group.cols + s]] += inner;
-                }
-            }
+            adjoint(self.n, &self.w, group, factor, h, &mut scratch.product, out);
         }
     }
 
-    /// out_i ← max(out_i, estimate of ‖F_i‖_F).
-    pub fn norms(&self, out: &mut [f64]) {
-        let length = |j: usize| {
-            self.w
-                .column(j)
-                .iter()
-                .map(|(_, v)| v * v)
-                .sum::<f64>()
-                .sqrt()
-        };
+    /// out_i ← max(out_i, estimate of ‖D F_i D‖_F) for a diagonal D.
+    pub fn norms(&self, d: &[f64], out: &mut [f64]) {
+        let length = |j: usize| self.w.column(j).iter().map(|&(i, v)| (v * d[i]).powi(2)).sum::<f64>().sqrt();
+        let lengths: Vec<f64> = (0..self.w.len()).map(length).collect();
         for group in &self.groups {
             for r in 0..group.rows {
                 for s in 0..group.cols {
-                    let norm = 2.0_f64.sqrt() * length(group.u + r) * length(group.v + s);
+                    let norm = 2.0_f64.sqrt() * lengths[group.u + r] * lengths[group.v + s];
                     let out = &mut out[group.positions[r * group.cols + s]];
                     *out = out.max(norm);
                 }
@@ -228,78 +195,205 @@ impl Factored {
         }
     }
 
-    /// M ← M + tr(F_i P F_j Z), lower triangle (j ≤ i stored at `m[i + j·N]`).
-    pub fn schur(
-        &self,
-        p: &[f64],
-        z: &[f64],
-        m: &mut [f64],
-        unknowns: usize,
-        scratch: &mut FactoredScratch,
-    ) {
-        let FactoredScratch {
-            product,
-            wpw,
-            wzw,
-            row: buffer,
-        } = scratch;
-        self.project(p, product, wpw);
-        self.project(z, product, wzw);
-        let w = self.w.len();
-        for row in &self.rows {
-            let target = &mut m[row.position * unknowns..(row.position + 1) * unknowns];
-            let g = &self.groups[row.group];
-            for h in &self.groups {
-                let first = h.last.partition_point(|_| false);
-                let buffer = &mut buffer[..h.positions.len()];
-                buffer.fill(0.0);
-                for &(p, q) in &row.entries[..row.count] {
-                    let (up, vq) = (g.u + p, g.v + q);
-                    let of = |m: &'_ [f64], column: usize, at: usize| m[column * w + at];
-                    let span = |column: usize| column * w + h.v..column * w + h.v + h.cols;
-                    let (zu, pv) = (&wzw[span(up)], &wpw[span(vq)]);
-                    let (zv, pu) = (&wzw[span(vq)], &wpw[span(up)]);
-                    for r in first..h.rows {
-                        if h.last[r] < row.position {
-                            continue;
-                        }
-                        let ur = h.u + r;
-                        let (a, b) = (of(wpw, vq, ur), of(wzw, up, ur));
-                        let (c, d) = (of(wpw, up, ur), of(wzw, vq, ur));
-                        let out = &mut buffer[r * h.cols..(r + 1) * h.cols];
-                        for ((((out, zu), pv), zv), pu) in
-                            out.iter_mut().zip(zu).zip(pv).zip(zv).zip(pu)
-                        {
-                            *out += a * zu + b * pv + c * zv + d * pu;
-                        }
-                    }
+    /// out_jk ← max(out_jk, estimate of |F_i,jk|) over all i.
+    pub fn magnitudes(&self, out: &mut [f64]) {
+        let n = self.n;
+        for group in &self.groups {
+            let largest = |columns: std::ops::Range<usize>| {
+                let mut out = vec![0.0_f64; n];
+                for &(i, value) in columns.flat_map(|j| self.w.column(j)) {
+                    out[i] = out[i].max(value.abs());
                 }
-                for (&position, value) in h.positions.iter().zip(buffer.iter()) {
-                    if position >= row.position {
-                        target[position] += value;
-                    }
+                out
+            };
+            let u = largest(group.u..group.u + group.rows);
+            let v = largest(group.v..group.v + group.cols);
+            for i in 0..n {
+                for j in 0..n {
+                    let value = (u[i] * v[j]).max(u[j] * v[i]);
+                    out[i + j * n] = out[i + j * n].max(value);
                 }
             }
         }
     }
 
+    /// M ← M + tr(F_i P F_j Z), lower triangle (j ≤ i stored at `m[i + j·N]`).
+    pub fn schur(&self, p: &[f64], z: &[f64], m: &mut [f64], unknowns: usize, scratch: &mut FactoredScratch) {
+        project(self.n, &self.w, p, &mut scratch.product, &mut scratch.wpw);
+        project(self.n, &self.w, z, &mut scratch.product, &mut scratch.wzw);
+        pulp::Arch::new().dispatch(SchurRows { factored: self, m, unknowns, scratch });
+    }
+}
+
+/// The rows of the Schur complement from `WᵀPW` and `WᵀZW`.
+struct SchurRows<'a> {
+    factored: &'a Factored,
+    m: &'a mut [f64],
+    unknowns: usize,
+    scratch: &'a mut FactoredScratch,
+}
+
+impl pulp::WithSimd for SchurRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self { factored, m, unknowns, scratch } = self;
+        let FactoredScratch { wpw, wzw, factors, lines, sum, .. } = scratch;
+        let w = factored.w.len();
+        for row in &factored.rows {
+            let target = &mut m[row.position * unknowns..(row.position + 1) * unknowns];
+            let g = &factored.groups[row.group];
+            for h in &factored.groups {
+                let padded = h.cols.next_multiple_of(PADDING);
+                let terms = 4 * row.count;
+                let lines = &mut lines[..terms * padded];
+                let factors = &mut factors[..terms * h.rows];
+                for (e, &(p, q)) in row.entries[..row.count].iter().enumerate() {
+                    let (up, vq) = ((g.u + p) * w, (g.v + q) * w);
+                    // (v_qᵀPu_r)(v_sᵀZu_p) + (v_qᵀPv_s)(u_rᵀZu_p) + (u_pᵀPu_r)(v_sᵀZv_q) + (u_pᵀPv_s)(u_rᵀZv_q)
+                    let left = [&wpw[vq..], &wzw[up..], &wpw[up..], &wzw[vq..]];
+                    let right = [&wzw[up..], &wpw[vq..], &wzw[vq..], &wpw[up..]];
+                    for (k, (left, right)) in left.into_iter().zip(right).enumerate() {
+                        let k = 4 * e + k;
+                        lines[k * padded..k * padded + h.cols].copy_from_slice(&right[h.v..h.v + h.cols]);
+                        for (r, value) in left[h.u..h.u + h.rows].iter().enumerate() {
+                            factors[r * terms + k] = *value;
+                        }
+                    }
+                }
+                let sum = &mut sum[..h.rows * padded];
+                if row.count == 1 {
+                    outer_products::<S, 4>(simd, h, row.position, factors, lines, sum);
+                } else {
+                    outer_products::<S, 8>(simd, h, row.position, factors, lines, sum);
+                }
+                add_from(h, row.position, padded, sum, target);
+            }
+        }
+    }
+}
+
+/// sum ← factors · lines for the rows of X that reach beyond `position`, K terms.
+#[inline(always)]
+fn outer_products<S: pulp::Simd, const K: usize>(
+    simd: S,
+    h: &Group,
+    position: usize,
+    factors: &[f64],
+    lines: &[f64],
+    sum: &mut [f64],
+) {
+    let (lines, _) = S::as_simd_f64s(lines);
+    let (sum, _) = S::as_mut_simd_f64s(sum);
+    let width = lines.len() / K;
+    for c in 0..width {
+        let line: [S::f64s; K] = std::array::from_fn(|k| lines[k * width + c]);
+        for ((factors, sum), places) in factors.chunks_exact(K).zip(sum.chunks_exact_mut(width)).zip(&h.places) {
+            if places.last(h.cols) < position {
+                continue;
+            }
+            let mut total = simd.mul_f64s(simd.splat_f64s(factors[0]), line[0]);
+            for k in 1..K {
+                total = simd.mul_add_e_f64s(simd.splat_f64s(factors[k]), line[k], total);
+            }
+            sum[c] = total;
+        }
+    }
+}
+
+/// Adds the entries of `sum` from `position` on to a row of the Schur complement.
+#[inline(always)]
+fn add_from(h: &Group, position: usize, padded: usize, sum: &[f64], target: &mut [f64]) {
+    for (r, (places, sum)) in h.places.iter().zip(sum.chunks_exact(padded)).enumerate() {
+        match *places {
+            Places::Run(first) => {
+                let skip = position.saturating_sub(first);
+                if skip < h.cols {
+                    axpy(1.0, &sum[skip..h.cols], &mut target[first + skip..first + h.cols]);
+                }
+            }
+            Places::Scattered(last) if last >= position => {
+                for (&at, value) in h.positions[r * h.cols..(r + 1) * h.cols].iter().zip(sum) {
+                    if at >= position {
+                        target[at] += value;
+                    }
+                }
+            }
+            Places::Scattered(_) => {}
+        }
+    }
+}
+
+vectorized! {
+    /// out ← out + U X Vᵀ + V Xᵀ Uᵀ of one group.
+    fn apply<'a>(
+        n: usize,
+        w: &'a Columns,
+        group: &'a Group,
+        x: &'a [f64],
+        product: &'a mut [f64],
+        out: &'a mut [f64],
+    ) {
+        let t = &mut product[..n * group.cols];
+        t.fill(0.0);
+        for r in 0..group.rows {
+            for &(i, value) in w.column(group.u + r) {
+                let positions = &group.positions[r * group.cols..(r + 1) * group.cols];
+                for (s, position) in positions.iter().enumerate() {
+                    t[i + s * n] += value * x[*position];
+                }
+            }
+        }
+        for (s, t) in t.chunks_exact(n).enumerate() {
+            for &(i, value) in w.column(group.v + s) {
+                axpy(value, t, &mut out[i * n..(i + 1) * n]);
+                for (k, t) in t.iter().enumerate() {
+                    out[i + k * n] += value * t;
+                }
+            }
+        }
+    }
+}
+
+vectorized! {
+    /// out_i ← out_i + factor·⟨F_i, H⟩ over one group.
+    fn adjoint<'a>(
+        n: usize,
+        w: &'a Columns,
+        group: &'a Group,
+        factor: f64,
+        h: &'a [f64],
+        product: &'a mut [f64],
+        out: &'a mut [f64],
+    ) {
+        let hv = &mut product[..n];
+        for s in 0..group.cols {
+            hv.fill(0.0);
+            for &(i, value) in w.column(group.v + s) {
+                axpy(2.0 * factor * value, &h[i * n..(i + 1) * n], hv);
+            }
+            for r in 0..group.rows {
+                let inner: f64 = w.column(group.u + r).iter().map(|&(i, value)| value * hv[i]).sum();
+                out[group.positions[r * group.cols + s]] += inner;
+            }
+        }
+    }
+}
+
+vectorized! {
     /// WᵀHW for symmetric H.
-    fn project(&self, h: &[f64], product: &mut [f64], out: &mut [f64]) {
-        let (n, w) = (self.n, self.w.len());
+    fn project<'a>(n: usize, w: &'a Columns, h: &'a [f64], product: &'a mut [f64], out: &'a mut [f64]) {
+        let count = w.len();
         for (j, hw) in product.chunks_exact_mut(n).enumerate() {
             hw.fill(0.0);
-            for &(i, value) in self.w.column(j) {
+            for &(i, value) in w.column(j) {
                 axpy(value, &h[i * n..(i + 1) * n], hw);
             }
             for k in 0..=j {
-                let inner: f64 = self
-                    .w
-                    .column(k)
-                    .iter()
-                    .map(|&(i, value)| value * hw[i])
-                    .sum();
-                out[k + j * w] = inner;
-                out[j + k * w] = inner;
+                let inner: f64 = w.column(k).iter().map(|&(i, value)| value * hw[i]).sum();
+                out[k + j * count] = inner;
+                out[j + k * count] = inner;
             }
         }
     }

@@ -23,6 +23,11 @@ const CERTIFICATE: f64 = 1e-8;
 
 /// From here on it is tried to complete a multiplier to an exact witness.
 const NEAR_CERTIFICATE: f64 = 1e-3;
+/// Dual residual of a direction from which on it is suspected to be noise.
+const NOISE: f64 = 1e-6;
+/// Where regularisation of such a direction begins, relative to the diagonal of M, and ends.
+const LEAST_REGULARIZATION: f64 = 1e-15;
+const MOST_REGULARIZATION: f64 = 1e-11;
 /// Rounds of refinement of one direction at most.
 const REFINEMENTS: usize = 10;
 
@@ -112,10 +117,7 @@ pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
         match feasibility.ending {
             Ending::PrimalInfeasible => return feasibility,
             Ending::Converged => {
-                return Solution {
-                    point: feasibility.point,
-                    ..solution
-                };
+                return Solution { point: feasibility.point, ..solution };
             }
             _ => {}
         }
@@ -161,17 +163,9 @@ fn iterate(blocks: &[Block], objective: &[f64], options: &Options, started: Inst
             best = Some((merit, status, it.point()));
             break Ending::DualInfeasible(ray);
         }
-        since_progress = if much || witness < 0.9 * best_witness {
-            0
-        } else {
-            since_progress + 1
-        };
+        since_progress = if much || witness < 0.9 * best_witness { 0 } else { since_progress + 1 };
         best_witness = best_witness.min(witness);
-        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) {
-            3
-        } else {
-            15
-        };
+        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) { 3 } else { 15 };
         if since_progress > patience {
             break Ending::Stopped(InaccurateReason::Stalled);
         }
@@ -181,8 +175,7 @@ fn iterate(blocks: &[Block], objective: &[f64], options: &Options, started: Inst
         match it.step(&status) {
             Some((centring, primal_step, dual_step)) => {
                 if let Some(entry) = log.last_mut() {
-                    (entry.centring, entry.primal_step, entry.dual_step) =
-                        (centring, primal_step, dual_step);
+                    (entry.centring, entry.primal_step, entry.dual_step) = (centring, primal_step, dual_step);
                 }
             }
             None => break Ending::Stopped(InaccurateReason::Stalled),
@@ -198,30 +191,16 @@ fn iterate(blocks: &[Block], objective: &[f64], options: &Options, started: Inst
         other => other,
     };
     let (_, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));
-    Solution {
-        point,
-        ending,
-        residuals: status.residuals,
-        dual_objective: status.dual_objective,
-        log,
-    }
+    Solution { point, ending, residuals: status.residuals, dual_objective: status.dual_objective, log }
 }
 
 impl<'a> Iteration<'a> {
     fn new(operators: &'a [Block], objective: &'a [f64], options: &'a Options) -> Self {
         let unknowns = objective.len();
-        let scales = start::scales(operators, objective);
-        let blocks: Vec<BlockState> = operators
-            .iter()
-            .zip(scales)
-            .map(|(block, (eta, xi))| BlockState::new(block, unknowns, eta, xi))
-            .collect();
-        let largest = operators
-            .iter()
-            .filter(|b| !b.is_diagonal())
-            .map(|b| b.size())
-            .max()
-            .unwrap_or(1);
+        let starts = start::start(operators, objective);
+        let blocks: Vec<BlockState> =
+            operators.iter().zip(starts).map(|(block, (s, z))| BlockState::new(block, unknowns, &s, &z)).collect();
+        let largest = operators.iter().filter(|b| !b.is_diagonal()).map(|b| b.size()).max().unwrap_or(1);
         Self {
             operators,
             objective,
@@ -244,10 +223,7 @@ impl<'a> Iteration<'a> {
     }
 
     fn point(&self) -> Point {
-        Point {
-            x: self.x.clone(),
-            z: self.blocks.iter().map(|b| b.z.clone()).collect(),
-        }
+        Point { x: self.x.clone(), z: self.blocks.iter().map(|b| b.z.clone()).collect() }
     }
 
     /// R = F(x) − S, closed exactly as soon as F(x) itself is positive definite; A(Z).
@@ -270,57 +246,38 @@ impl<'a> Iteration<'a> {
     }
 
     fn primal_residual(&self) -> f64 {
-        let relative = self
-            .blocks
-            .iter()
-            .zip(&self.constant_norms)
-            .map(|(b, c)| norm(&b.residual) / (1.0 + c));
+        let relative = self.blocks.iter().zip(&self.constant_norms).map(|(b, c)| norm(&b.residual) / (1.0 + c));
         relative.fold(0.0, nan_max)
     }
 
     fn dual_residual(&self) -> f64 {
-        let differences = self
-            .objective
-            .iter()
-            .zip(&self.az)
-            .map(|(c, a)| (c - a).abs());
+        let differences = self.objective.iter().zip(&self.az).map(|(c, a)| (c - a).abs());
         differences.fold(0.0, nan_max) / (1.0 + self.objective_norm)
     }
 
     fn status(&self) -> Status {
         let objective = dot(self.objective, &self.x);
-        let dual_objective = -self
-            .operators
-            .iter()
-            .zip(&self.blocks)
-            .map(|(b, s)| dot(b.constant(), &s.z))
-            .sum::<f64>();
+        let dual_objective =
+            -self.operators.iter().zip(&self.blocks).map(|(b, s)| dot(b.constant(), &s.z)).sum::<f64>();
         let complementarity: f64 = self.blocks.iter().map(|b| dot(&b.s, &b.z)).sum();
+        // d ≤ p* + Σ|cᵢ − A(Z)ᵢ||xᵢ*|: with large x, small residuals spoil the bound.
+        let differences = self.objective.iter().zip(&self.az).map(|(c, a)| c - a);
+        let uncertainty: f64 = differences.zip(&self.x).map(|(difference, x)| (difference * x).abs()).sum();
+        let scale = 1.0 + objective.abs() + dual_objective.abs();
         let residuals = Residuals {
             primal: self.primal_residual(),
             dual: self.dual_residual(),
-            gap: (objective - dual_objective).abs()
-                / (1.0 + objective.abs() + dual_objective.abs()),
+            gap: nan_max((objective - dual_objective).abs(), uncertainty) / scale,
         };
-        Status {
-            objective,
-            dual_objective,
-            residuals,
-            mu: complementarity / self.order,
-        }
+        Status { objective, dual_objective, residuals, mu: complementarity / self.order }
     }
 
     fn interrupted(&self, iterations: usize, started: Instant) -> Option<InaccurateReason> {
-        let cancelled =
-            |flag: &std::sync::Arc<std::sync::atomic::AtomicBool>| flag.load(Ordering::Relaxed);
+        let cancelled = |flag: &std::sync::Arc<std::sync::atomic::AtomicBool>| flag.load(Ordering::Relaxed);
         if self.options.cancel.as_ref().is_some_and(cancelled) {
             return Some(InaccurateReason::Cancelled);
         }
-        if self
-            .options
-            .time_limit
-            .is_some_and(|limit| started.elapsed() >= limit)
-        {
+        if self.options.time_limit.is_some_and(|limit| started.elapsed() >= limit) {
             return Some(InaccurateReason::TimeLimit);
         }
         (iterations > self.options.max_iterations).then_some(InaccurateReason::IterationLimit)
@@ -332,56 +289,54 @@ impl<'a> Iteration<'a> {
         self.schur.matrix.fill(0.0);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.invert(&mut self.scratch);
-            let BlockState {
-                s_inverse,
-                z,
-                operator,
-                ..
-            } = state;
+            let BlockState { s_inverse, z, operator, .. } = state;
             block.schur(s_inverse, z, &mut self.schur.matrix, unknowns, operator);
         }
-        if !self.schur.factorize() {
-            return None;
+        let (mut sigma, mut primal, mut dual);
+        let mut regularization = 0.0;
+        loop {
+            if !self.schur.factorize(regularization) {
+                return None;
+            }
+            (sigma, primal, dual) = self.predict_and_correct(status);
+            let left = self.refine();
+            // A direction that misses the dual equations by more than they are missed now is noise: M is factorised
+            // again, a little further from singular.
+            let bad = left.is_nan() || left > NOISE.max(2.0 * status.residuals.dual);
+            if !bad || regularization >= MOST_REGULARIZATION {
+                break;
+            }
+            regularization = (100.0 * self.schur.regularization).max(LEAST_REGULARIZATION);
         }
-        let feasible = self.feasible;
-        self.blocks
-            .iter_mut()
-            .for_each(|state| state.begin_predictor(feasible));
-        self.direction();
-        let (primal, dual) = self.longest_steps(0.3);
-        let (primal, dual) = (primal.min(1.0), dual.min(1.0));
-        let reached: f64 = self
-            .blocks
-            .iter()
-            .map(|b| b.complementarity(primal, dual))
-            .sum::<f64>()
-            / self.order;
-        let ratio = (reached / status.mu).clamp(0.0, 1.0);
-        let exponent = (3.0 * primal.min(dual).powi(2)).max(1.0);
-        let sigma = ratio.powf(exponent).clamp(1e-6, 1.0);
-        self.blocks
-            .iter_mut()
-            .for_each(|state| state.begin_corrector(sigma * status.mu));
-        self.direction();
-        self.refine();
         let fraction = 0.9 + 0.09 * primal.min(dual);
         let (primal, dual) = self.longest_steps(0.05);
         let (primal, dual) = ((fraction * primal).min(1.0), (fraction * dual).min(1.0));
         let primal = self.safeguard(primal, BlockState::try_primal)?;
         let dual = self.safeguard(dual, BlockState::try_dual)?;
-        self.blocks
-            .iter_mut()
-            .for_each(|state| state.advance(primal, dual));
+        self.blocks.iter_mut().for_each(|state| state.advance(primal, dual));
         crate::dense::axpy(primal, &self.dx, &mut self.x);
         Some((sigma, primal, dual))
     }
 
+    /// The predictor, then the corrector's direction: (centring, primal step, dual step of the predictor).
+    fn predict_and_correct(&mut self, status: &Status) -> (f64, f64, f64) {
+        let feasible = self.feasible;
+        self.blocks.iter_mut().for_each(|state| state.begin_predictor(feasible));
+        self.direction();
+        let (primal, dual) = self.longest_steps(0.3);
+        let (primal, dual) = (primal.min(1.0), dual.min(1.0));
+        let reached: f64 = self.blocks.iter().map(|b| b.complementarity(primal, dual)).sum::<f64>() / self.order;
+        let ratio = (reached / status.mu).clamp(0.0, 1.0);
+        let exponent = (3.0 * primal.min(dual).powi(2)).max(1.0);
+        let sigma = ratio.powf(exponent).clamp(1e-6, 1.0);
+        self.blocks.iter_mut().for_each(|state| state.begin_corrector(sigma * status.mu));
+        self.direction();
+        (sigma, primal, dual)
+    }
+
     /// dx, dS and dZ for the right side that the blocks hold.
     fn direction(&mut self) {
-        self.right_side
-            .iter_mut()
-            .zip(self.objective)
-            .for_each(|(r, c)| *r = -c);
+        self.right_side.iter_mut().zip(self.objective).for_each(|(r, c)| *r = -c);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.add_right_side(block, &mut self.right_side);
         }
@@ -393,29 +348,31 @@ impl<'a> Iteration<'a> {
 
     /// Iterative refinement of the direction against the dual equations A(Z + dZ) = c themselves: close to the optimum S⁻¹ is
     /// large, and what rounding leaves of the equations in `sym(P F(dx) Z)` would otherwise add up in Z.
-    fn refine(&mut self) {
+    /// Gives the dual residual at Z + dZ.
+    fn refine(&mut self) -> f64 {
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
             self.right_side.copy_from_slice(self.objective);
             for (state, block) in self.blocks.iter_mut().zip(self.operators) {
                 state.subtract_dual(block, &mut self.right_side);
             }
-            let size = self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs()))
-                / (1.0 + self.objective_norm);
-            if size.is_nan()
-                || size <= 1e-3 * self.options.feasibility_tolerance
-                || size > 0.9 * last
-            {
-                return;
+            let size = self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs())) / (1.0 + self.objective_norm);
+            if size.is_nan() || size <= 1e-3 * self.options.feasibility_tolerance || size > 0.9 * last {
+                return size;
             }
             last = size;
             self.right_side.iter_mut().for_each(|r| *r = -*r);
             self.schur.solve(&self.right_side, &mut self.change);
+            // A correction larger than the direction itself is noise.
+            if norm(&self.change) > norm(&self.dx) {
+                return size;
+            }
             crate::dense::axpy(1.0, &self.change, &mut self.dx);
             for (state, block) in self.blocks.iter_mut().zip(self.operators) {
                 state.refine(block, &self.change);
             }
         }
+        last
     }
 
     fn longest_steps(&mut self, accuracy: f64) -> (f64, f64) {
@@ -428,20 +385,12 @@ impl<'a> Iteration<'a> {
     }
 
     /// Shortens a step until every block stays positive definite.
-    fn safeguard(
-        &mut self,
-        mut step: f64,
-        attempt: fn(&mut BlockState, f64, &mut Scratch) -> bool,
-    ) -> Option<f64> {
+    fn safeguard(&mut self, mut step: f64, attempt: fn(&mut BlockState, f64, &mut Scratch) -> bool) -> Option<f64> {
         for _ in 0..40 {
             if step < 1e-9 {
                 return None;
             }
-            if self
-                .blocks
-                .iter_mut()
-                .all(|state| attempt(state, step, &mut self.scratch))
-            {
+            if self.blocks.iter_mut().all(|state| attempt(state, step, &mut self.scratch)) {
                 return Some(step);
             }
             step *= 0.8;
@@ -452,9 +401,5 @@ impl<'a> Iteration<'a> {
 
 /// The larger one, or NaN when either is.
 fn nan_max(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() {
-        f64::NAN
-    } else {
-        a.max(b)
-    }
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }

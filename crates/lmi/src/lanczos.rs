@@ -5,6 +5,7 @@
 //! two matrix-vector products a step, no eigendecomposition. (Toh, SIAM J. Optim. 12, 2002, for the bound.)
 
 use crate::dense::{apply, axpy, dot};
+use crate::vectorized::vectorized;
 
 /// Most steps of one estimate. The result is safe-guarded by a Cholesky factorisation, so that few suffice.
 const STEPS: usize = 30;
@@ -21,33 +22,33 @@ pub(crate) struct Lanczos {
 
 impl Lanczos {
     pub fn new(n: usize) -> Self {
-        Self {
-            v: vec![0.0; n],
-            sv: vec![0.0; n],
-            sv_before: vec![0.0; n],
-            w: vec![0.0; n],
-            u: vec![0.0; n],
-        }
+        Self { v: vec![0.0; n], sv: vec![0.0; n], sv_before: vec![0.0; n], w: vec![0.0; n], u: vec![0.0; n] }
     }
 
-    /// A lower estimate, to the relative `accuracy`, of the largest α with `S + αD ⪰ 0`; infinite when the estimate finds no end.
+    /// An estimate from below, to the relative `accuracy`, of the largest α with `S + αD ⪰ 0`; infinite when the estimate finds no end.
     ///
     /// Given are S itself, its inverse and D, symmetric n × n.
-    pub fn step(
-        &mut self,
+    pub fn step(&mut self, n: usize, s: &[f64], s_inverse: &[f64], d: &[f64], accuracy: f64) -> f64 {
+        longest_step(self, n, s, s_inverse, d, accuracy)
+    }
+}
+
+vectorized! {
+    fn longest_step<'a>(
+        lanczos: &'a mut Lanczos,
         n: usize,
-        s: &[f64],
-        s_inverse: &[f64],
-        d: &[f64],
+        s: &'a [f64],
+        s_inverse: &'a [f64],
+        d: &'a [f64],
         accuracy: f64,
     ) -> f64 {
-        let Self {
+        let Lanczos {
             v,
             sv,
             sv_before,
             w,
             u,
-        } = self;
+        } = lanczos;
         let (v, sv, sv_before) = (&mut v[..n], &mut sv[..n], &mut sv_before[..n]);
         let (w, u) = (&mut w[..n], &mut u[..n]);
         // A fixed start without pattern.
@@ -118,9 +119,7 @@ fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> (f64, f64) {
         let right = if i + 1 < k { off[i].abs() } else { 0.0 };
         left + right
     };
-    let mut low = (0..k)
-        .map(|i| diagonal[i] - radius(i))
-        .fold(f64::INFINITY, f64::min);
+    let mut low = (0..k).map(|i| diagonal[i] - radius(i)).fold(f64::INFINITY, f64::min);
     let mut high = diagonal.iter().copied().fold(f64::INFINITY, f64::min);
     // Sturm: the pivots of T − λI are all positive exactly when λ is below the spectrum.
     let below = |lambda: f64| {
@@ -138,28 +137,80 @@ fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> (f64, f64) {
             break;
         }
         let middle = 0.5 * (low + high);
-        if below(middle) {
-            low = middle
-        } else {
-            high = middle
-        }
+        if below(middle) { low = middle } else { high = middle }
     }
     // The eigenvector by its recurrence from the first component on.
     let (mut before, mut now, mut sum) = (0.0, 1.0, 1.0);
     for i in 0..k - 1 {
         let previous = if i > 0 { off[i - 1] * before } else { 0.0 };
-        let next = if off[i] != 0.0 {
-            ((low - diagonal[i]) * now - previous) / off[i]
-        } else {
-            0.0
-        };
+        let next = if off[i] != 0.0 { ((low - diagonal[i]) * now - previous) / off[i] } else { 0.0 };
         (before, now) = (now, next);
         sum += now * now;
     }
-    let component = if sum.is_finite() {
-        now.abs() / sum.sqrt()
-    } else {
-        1.0
-    };
+    let component = if sum.is_finite() { now.abs() / sum.sqrt() } else { 1.0 };
     (low, component)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dense::{Scratch, cholesky, inverse_from_factor};
+    use faer::{Mat, Side};
+
+    fn sample(n: usize, seed: u64) -> Vec<f64> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
+        };
+        let m = Mat::from_fn(n, n, |_, _| next());
+        let symmetric = &m + m.transpose();
+        (0..n * n).map(|at| symmetric[(at % n, at / n)]).collect()
+    }
+
+    /// Close to the end that the eigenvalues of S⁻¹D give.
+    #[test]
+    fn step_agrees_with_eigenvalues() {
+        for (n, seed) in [(1, 1), (2, 2), (3, 3), (8, 4), (28, 5), (28, 6), (60, 7)] {
+            let (mut s, d) = (sample(n, seed), sample(n, seed + 100));
+            (0..n).for_each(|i| s[i + i * n] += 4.0 * (n as f64).sqrt());
+            let mut factor = s.clone();
+            let mut scratch = Scratch::new(n);
+            assert!(cholesky(n, &mut factor, &mut scratch));
+            let mut inverse = vec![0.0; n * n];
+            inverse_from_factor(n, &factor, &mut inverse, &mut scratch);
+            let lower = Mat::from_fn(n, n, |i, j| if i >= j { factor[i + j * n] } else { 0.0 });
+            let d_matrix = Mat::from_fn(n, n, |i, j| d[i + j * n]);
+            let mut half = d_matrix.clone();
+            faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+                lower.as_ref(),
+                half.as_mut(),
+                faer::Par::Seq,
+            );
+            let mut whole = half.transpose().to_owned();
+            faer::linalg::triangular_solve::solve_lower_triangular_in_place(
+                lower.as_ref(),
+                whole.as_mut(),
+                faer::Par::Seq,
+            );
+            let smallest = whole.self_adjoint_eigenvalues(Side::Lower).unwrap()[0];
+            let step = Lanczos::new(n).step(n, &s, &inverse, &d, 0.05);
+            if smallest > -0.05 {
+                assert!(step > 5.0, "{n}: {step} for {smallest}");
+                continue;
+            }
+            let end = -1.0 / smallest;
+            // The residual bound speaks of some eigenvalue, so that a few percent too much are possible; the caller checks.
+            assert!(step <= 1.1 * end && step >= 0.8 * end, "{n}: {step} of {end}");
+        }
+    }
+
+    #[test]
+    fn smallest_eigenvalue_of_a_second_difference() {
+        let (value, component) = smallest_of_tridiagonal(&[2.0; 5], &[-1.0; 4]);
+        let exact = 2.0 - 2.0 * (std::f64::consts::PI / 6.0).cos();
+        assert!((value - exact).abs() < 1e-3 && value <= exact);
+        // The eigenvector is sin(kπ/6)/√3.
+        assert!((component - 0.5 / 3.0_f64.sqrt()).abs() < 1e-2);
+    }
 }

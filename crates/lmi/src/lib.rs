@@ -68,11 +68,10 @@ mod schur;
 pub mod sdpa;
 mod sparse;
 mod start;
+mod vectorized;
 mod verification;
 
-pub use answer::{
-    Answer, BlockReport, InaccurateReason, IterationLog, Outcome, Ray, Residuals, Witness,
-};
+pub use answer::{Answer, BlockReport, InaccurateReason, IterationLog, Outcome, Ray, Residuals, Witness};
 pub use error::Error;
 pub use expression::Expr;
 pub use options::Options;

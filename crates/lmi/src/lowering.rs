@@ -26,17 +26,9 @@ impl Layout {
         let mut starts = Vec::with_capacity(unknowns.len());
         for unknown in unknowns {
             starts.push(len);
-            len += if unknown.symmetric {
-                unknown.rows * (unknown.rows + 1) / 2
-            } else {
-                unknown.rows * unknown.cols
-            };
+            len += if unknown.symmetric { unknown.rows * (unknown.rows + 1) / 2 } else { unknown.rows * unknown.cols };
         }
-        Self {
-            unknowns: unknowns.to_vec(),
-            starts,
-            len,
-        }
+        Self { unknowns: unknowns.to_vec(), starts, len }
     }
 
     /// Number of scalar unknowns.
@@ -58,10 +50,7 @@ impl Layout {
     /// The unknowns as matrices.
     pub fn matrices(&self, x: &[f64]) -> Vec<Mat<f64>> {
         let entry = |unknown: Unknown| move |i, j| x[self.position(unknown, i, j)];
-        self.unknowns
-            .iter()
-            .map(|&u| Mat::from_fn(u.rows, u.cols, entry(u)))
-            .collect()
+        self.unknowns.iter().map(|&u| Mat::from_fn(u.rows, u.cols, entry(u))).collect()
     }
 
     /// From a gradient with respect to each matrix to the gradient with respect to x: the entries (i, j) and (j, i) of
@@ -111,16 +100,9 @@ pub(crate) fn lower(
         check_expression(problem, &place, &inequality.expression)?;
         check_symmetric(inequality, &layout)?;
         let scale = verification::largest_entry(&inequality.expression.constant);
-        let margin = inequality
-            .margin
-            .unwrap_or(options.margin * if scale > 0.0 { scale } else { 1.0 });
+        let margin = inequality.margin.unwrap_or(options.margin * if scale > 0.0 { scale } else { 1.0 });
         if !margin.is_finite() {
-            return Err(Error::NotFinite {
-                place: format!("the margin of {place}"),
-                row: 0,
-                column: 0,
-                value: margin,
-            });
+            return Err(Error::NotFinite { place: format!("the margin of {place}"), row: 0, column: 0, value: margin });
         }
         blocks.push(lower_block(&inequality.expression, margin, &layout));
         margins.push(margin);
@@ -129,34 +111,19 @@ pub(crate) fn lower(
     if let Some((sense, expression)) = objective {
         check_expression(problem, "the objective", expression)?;
         if (expression.nrows(), expression.ncols()) != (1, 1) {
-            return Err(Error::ObjectiveNotScalar {
-                rows: expression.nrows(),
-                columns: expression.ncols(),
-            });
+            return Err(Error::ObjectiveNotScalar { rows: expression.nrows(), columns: expression.ncols() });
         }
         sign = if *sense == Sense::Minimize { 1.0 } else { -1.0 };
         objective_constant = expression.constant[(0, 0)];
-        let mut gradients: Vec<Mat<f64>> = unknowns
-            .iter()
-            .map(|u| Mat::zeros(u.rows, u.cols))
-            .collect();
+        let mut gradients: Vec<Mat<f64>> = unknowns.iter().map(|u| Mat::zeros(u.rows, u.cols)).collect();
         let one = Mat::from_fn(1, 1, |_, _| sign);
         for term in expression.terms.iter() {
             gradients[term.unknown.index] += verification::gradient(term, &one);
         }
         c = layout.scalars(&gradients);
     }
-    let program = Program {
-        objective: c,
-        blocks,
-    };
-    Ok(Lowered {
-        program,
-        layout,
-        margins,
-        objective_constant,
-        sign,
-    })
+    let program = Program { objective: c, blocks };
+    Ok(Lowered { program, layout, margins, objective_constant, sign })
 }
 
 /// The Schur complement of this many unknowns takes 3.2 GB.
@@ -164,23 +131,14 @@ const MOST_UNKNOWNS: usize = 20_000;
 
 pub(crate) fn check_size(unknowns: usize) -> Result<(), Error> {
     if unknowns > MOST_UNKNOWNS {
-        return Err(Error::TooLarge {
-            unknowns,
-            allowed: MOST_UNKNOWNS,
-        });
+        return Err(Error::TooLarge { unknowns, allowed: MOST_UNKNOWNS });
     }
     Ok(())
 }
 
 fn check_expression(problem: u64, place: &str, expression: &Expr) -> Result<(), Error> {
-    if expression
-        .terms
-        .iter()
-        .any(|term| term.unknown.problem != problem)
-    {
-        return Err(Error::ForeignUnknown {
-            place: place.to_owned(),
-        });
+    if expression.terms.iter().any(|term| term.unknown.problem != problem) {
+        return Err(Error::ForeignUnknown { place: place.to_owned() });
     }
     let parts = expression.terms.iter().flat_map(|term| match &term.shape {
         Shape::Product { left, right, .. } => [left, right],
@@ -191,12 +149,7 @@ fn check_expression(problem: u64, place: &str, expression: &Expr) -> Result<(), 
             for row in 0..matrix.nrows() {
                 let value = matrix[(row, column)];
                 if !value.is_finite() {
-                    return Err(Error::NotFinite {
-                        place: place.to_owned(),
-                        row,
-                        column,
-                        value,
-                    });
+                    return Err(Error::NotFinite { place: place.to_owned(), row, column, value });
                 }
             }
         }
@@ -210,11 +163,7 @@ fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error
     let expression = &inequality.expression;
     let (rows, columns) = (expression.nrows(), expression.ncols());
     if rows != columns {
-        return Err(Error::NotSquare {
-            name: inequality.name.clone(),
-            rows,
-            columns,
-        });
+        return Err(Error::NotSquare { name: inequality.name.clone(), rows, columns });
     }
     let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
     for probe in 0..3 {
@@ -223,11 +172,7 @@ fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error
                 seed ^= seed << 13;
                 seed ^= seed >> 7;
                 seed ^= seed << 17;
-                if probe == 0 {
-                    0.0
-                } else {
-                    (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-                }
+                if probe == 0 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5 }
             })
             .collect();
         let values = layout.matrices(&x);
@@ -272,18 +217,13 @@ fn lower_block(expression: &Expr, margin: f64, layout: &Layout) -> Block {
     let mut products = Vec::new();
     for term in expression.terms.iter() {
         match &term.shape {
-            Shape::Scaled { weights, matrix } => {
-                scaled_entries(term.unknown, weights, matrix, layout, &mut entries)
-            }
+            Shape::Scaled { weights, matrix } => scaled_entries(term.unknown, weights, matrix, layout, &mut entries),
             Shape::Product { .. } => products.push(Product::of(term)),
         }
     }
     let stacks = stack(products, layout);
     if n == 1 {
-        let mut row: Vec<(usize, f64)> = entries
-            .iter()
-            .map(|e: &Entry| (e.unknown, e.value))
-            .collect();
+        let mut row: Vec<(usize, f64)> = entries.iter().map(|e: &Entry| (e.unknown, e.value)).collect();
         for stack in &stacks {
             let k = stack.v.len();
             for (r, u) in stack.u.iter().enumerate() {
@@ -294,21 +234,10 @@ fn lower_block(expression: &Expr, margin: f64, layout: &Layout) -> Block {
         }
         return Block::Diagonal(DiagonalBlock::new(constant, vec![row]));
     }
-    Block::Dense(DenseBlock {
-        size: n,
-        constant,
-        factored: Factored::new(n, stacks),
-        sparse: Sparse::new(n, entries),
-    })
+    Block::Dense(DenseBlock { size: n, constant, factored: Factored::new(n, stacks), sparse: Sparse::new(n, entries) })
 }
 
-fn scaled_entries(
-    unknown: Unknown,
-    weights: &Mat<f64>,
-    matrix: &Mat<f64>,
-    layout: &Layout,
-    entries: &mut Vec<Entry>,
-) {
+fn scaled_entries(unknown: Unknown, weights: &Mat<f64>, matrix: &Mat<f64>, layout: &Layout, entries: &mut Vec<Entry>) {
     for i in 0..weights.nrows() {
         for j in 0..weights.ncols() {
             let weight = weights[(i, j)];
@@ -319,12 +248,7 @@ fn scaled_entries(
                 for row in column..matrix.nrows() {
                     let value = 0.5 * weight * (matrix[(row, column)] + matrix[(column, row)]);
                     if value != 0.0 {
-                        entries.push(Entry {
-                            unknown: layout.position(unknown, i, j),
-                            row,
-                            column,
-                            value,
-                        });
+                        entries.push(Entry { unknown: layout.position(unknown, i, j), row, column, value });
                     }
                 }
             }
@@ -342,12 +266,7 @@ struct Product {
 
 impl Product {
     fn of(term: &Term) -> Self {
-        let Shape::Product {
-            left,
-            transposed,
-            right,
-        } = &term.shape
-        else {
+        let Shape::Product { left, transposed, right } = &term.shape else {
             unreachable!("only products are lowered to products");
         };
         // U Xᵀ V and its transpose Vᵀ X Uᵀ have the same symmetric part.
@@ -356,12 +275,7 @@ impl Product {
         } else {
             (left.clone(), right.transpose().to_owned())
         };
-        Self {
-            unknown: term.unknown,
-            u,
-            v,
-        }
-        .normalized()
+        Self { unknown: term.unknown, u, v }.normalized()
     }
 
     /// Moves sign and power of two of V's first entry to U, exactly, so that equal factors compare equal.
@@ -371,9 +285,7 @@ impl Product {
             .map(|(i, j)| self.v[(i, j)])
             .find(|&v| v != 0.0);
         if let Some(first) = first {
-            let scale = 2.0_f64
-                .powi(first.abs().log2().floor().clamp(-900.0, 900.0) as i32)
-                .copysign(first);
+            let scale = 2.0_f64.powi(first.abs().log2().floor().clamp(-900.0, 900.0) as i32).copysign(first);
             self.u *= faer::Scale(scale);
             self.v *= faer::Scale(1.0 / scale);
         }
@@ -382,14 +294,9 @@ impl Product {
 
     /// The same term with the factors exchanged, which a symmetric unknown permits.
     fn flipped(&self) -> Option<Self> {
-        self.unknown.symmetric.then(|| {
-            Self {
-                unknown: self.unknown,
-                u: self.v.clone(),
-                v: self.u.clone(),
-            }
-            .normalized()
-        })
+        self.unknown
+            .symmetric
+            .then(|| Self { unknown: self.unknown, u: self.v.clone(), v: self.u.clone() }.normalized())
     }
 
     /// The term written with the given right factor, when it can be.
@@ -420,19 +327,12 @@ fn stack(products: Vec<Product>, layout: &Layout) -> Vec<Stack> {
         }
         left = rest;
         let columns = nonzero_columns(&v);
-        let mut stack = Stack {
-            u: Vec::new(),
-            v: columns.iter().map(|&j| column(&v, j, 1.0)).collect(),
-            positions: vec![],
-        };
+        let mut stack =
+            Stack { u: Vec::new(), v: columns.iter().map(|&j| column(&v, j, 1.0)).collect(), positions: vec![] };
         for product in &merged {
             for i in nonzero_columns(&product.u) {
                 stack.u.push(column(&product.u, i, 0.5));
-                stack.positions.extend(
-                    columns
-                        .iter()
-                        .map(|&j| layout.position(product.unknown, i, j)),
-                );
+                stack.positions.extend(columns.iter().map(|&j| layout.position(product.unknown, i, j)));
             }
         }
         if !stack.u.is_empty() && !stack.v.is_empty() {
@@ -455,14 +355,11 @@ fn merge_left_factors(products: Vec<Product>) -> Vec<Product> {
     };
     let prefers_left: Vec<bool> = products
         .iter()
-        .map(|p| {
-            !p.unknown.symmetric && distinct(p.unknown, |p| &p.u) < distinct(p.unknown, |p| &p.v)
-        })
+        .map(|p| !p.unknown.symmetric && distinct(p.unknown, |p| &p.u) < distinct(p.unknown, |p| &p.v))
         .collect();
     let mut merged: Vec<Product> = Vec::new();
     for (product, prefers_left) in products.into_iter().zip(prefers_left) {
-        let same =
-            |m: &&mut Product| prefers_left && m.unknown == product.unknown && m.u == product.u;
+        let same = |m: &&mut Product| prefers_left && m.unknown == product.unknown && m.u == product.u;
         match merged.iter_mut().find(same) {
             Some(m) => m.v += &product.v,
             None => merged.push(product),
@@ -492,11 +389,109 @@ fn most_frequent_right_factor(products: &[Product]) -> Mat<f64> {
 }
 
 fn nonzero_columns(m: &Mat<f64>) -> Vec<usize> {
-    (0..m.ncols())
-        .filter(|&j| (0..m.nrows()).any(|i| m[(i, j)] != 0.0))
-        .collect()
+    (0..m.ncols()).filter(|&j| (0..m.nrows()).any(|i| m[(i, j)] != 0.0)).collect()
 }
 
 fn column(m: &Mat<f64>, j: usize, factor: f64) -> Vec<f64> {
     (0..m.nrows()).map(|i| factor * m[(i, j)]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Problem;
+
+    fn patternless(rows: usize, cols: usize) -> Mat<f64> {
+        Mat::from_fn(rows, cols, |i, j| ((3 * i + 5 * j + i * j) % 11) as f64 / 7.0 - 0.6)
+    }
+
+    /// [−s − sᵀ, Y, Lᵀ; Y, I, 0; L, 0, I] for s = AY − BL.
+    fn riccati(y: &Expr, l: &Expr) -> Expr {
+        let (n, m) = (y.nrows(), l.nrows());
+        let s = patternless(n, n) * y - patternless(n, m) * l;
+        Expr::symmetric_blocks(vec![
+            vec![-(&s + s.t())],
+            vec![y.clone(), Expr::identity(n)],
+            vec![l.clone(), Expr::zeros(m, n), Expr::identity(m)],
+        ])
+    }
+
+    fn stacks(expression: &Expr, layout: &Layout) -> Vec<Stack> {
+        stack(expression.terms.iter().map(Product::of).collect(), layout)
+    }
+
+    #[test]
+    fn a_riccati_inequality_is_one_stack() {
+        let mut problem = Problem::new();
+        let (y, l) = (problem.symmetric("Y", 3), problem.rectangular("L", 2, 3));
+        let layout = Layout::new(&[y.terms[0].unknown, l.terms[0].unknown]);
+        let stacks = stacks(&riccati(&y, &l), &layout);
+        assert_eq!(stacks.len(), 1);
+        assert_eq!((stacks[0].u.len(), stacks[0].v.len()), (5, 3));
+    }
+
+    #[test]
+    fn only_the_rows_in_use_are_stacked() {
+        let mut problem = Problem::new();
+        let (y, l) = (problem.symmetric("Y", 3), problem.rectangular("L", 2, 3));
+        let layout = Layout::new(&[y.terms[0].unknown, l.terms[0].unknown]);
+        let corner = Expr::symmetric_blocks(vec![vec![Expr::identity(1)], vec![l.row(1).t(), y.clone()]]);
+        let stacks = stacks(&corner, &layout);
+        assert_eq!(stacks.len(), 1);
+        assert_eq!(stacks[0].u.len(), 4);
+    }
+
+    /// The operators of a lowered block against the expression itself.
+    #[test]
+    fn a_lowered_block_is_its_expression() {
+        let mut problem = Problem::new();
+        let (y, l, t) = (problem.symmetric("Y", 3), problem.rectangular("L", 2, 3), problem.scalar("t"));
+        let unknowns = [y.terms[0].unknown, l.terms[0].unknown, t.terms[0].unknown];
+        let layout = Layout::new(&unknowns);
+        let n = layout.len();
+        let f = riccati(&y, &l)
+            + t.times(&Mat::identity(8, 8))
+            + (y.trace() + 2.0 * &t).times(&Mat::from_fn(8, 8, |i, j| (i * j) as f64));
+        let block = lower_block(&f, 0.0, &layout);
+        let mut scratch = block.scratch(n);
+        let columns = |m: &Mat<f64>| -> Vec<f64> { (0..64).map(|at| m[(at % 8, at / 8)]).collect() };
+        let value = |x: &[f64]| {
+            let values = layout.matrices(x);
+            columns(&f.evaluate(&|unknown| &values[unknown.index]))
+        };
+        let zero = value(&vec![0.0; n]);
+        assert_eq!(block.constant(), zero);
+        let coefficients: Vec<Vec<f64>> = (0..n)
+            .map(|k| {
+                let mut x = vec![0.0; n];
+                x[k] = 1.0;
+                let difference: Vec<f64> = value(&x).iter().zip(&zero).map(|(a, b)| a - b).collect();
+                let mut out = vec![0.0; 64];
+                block.apply(&x, &mut out, &mut scratch);
+                assert!(out.iter().zip(&difference).all(|(a, b)| (a - b).abs() < 1e-12));
+                difference
+            })
+            .collect();
+        // Symmetric P and Z, M_ij = tr(F_i P F_j Z).
+        let symmetric = |m: Mat<f64>| columns(&(&m + m.transpose() + 9.0 * Mat::<f64>::identity(8, 8)));
+        let (p, z) = (symmetric(patternless(8, 8)), symmetric(patternless(8, 9).subcols(1, 8).to_owned()));
+        let mut adjoint = vec![0.0; n];
+        block.adjoint(1.0, &p, &mut adjoint, &mut scratch);
+        let mut m = vec![0.0; n * n];
+        block.schur(&p, &z, &mut m, n, &mut scratch);
+        let matrix = |v: &[f64]| Mat::from_fn(8, 8, |i, j| v[i + 8 * j]);
+        for j in 0..n {
+            let inner: f64 = coefficients[j].iter().zip(&p).map(|(a, b)| a * b).sum();
+            assert!((adjoint[j] - inner).abs() < 1e-10);
+            for i in j..n {
+                let product = matrix(&coefficients[i]) * matrix(&p) * matrix(&coefficients[j]) * matrix(&z);
+                let trace: f64 = (0..8).map(|k| product[(k, k)]).sum();
+                assert!(
+                    (m[i + j * n] - trace).abs() < 1e-8 * (1.0 + trace.abs()),
+                    "({i}, {j}): {} {trace}",
+                    m[i + j * n]
+                );
+            }
+        }
+    }
 }

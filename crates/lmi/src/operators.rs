@@ -26,24 +26,12 @@ fn sum(a: &Expr, b: &Expr, sign: f64) -> Expr {
 fn scaled(a: &Expr, factor: f64) -> Expr {
     let terms = a.terms.iter().map(|term| {
         let shape = match &term.shape {
-            Shape::Product {
-                left,
-                transposed,
-                right,
-            } => Shape::Product {
-                left: factor * left,
-                transposed: *transposed,
-                right: right.clone(),
-            },
-            Shape::Scaled { weights, matrix } => Shape::Scaled {
-                weights: weights.clone(),
-                matrix: factor * matrix,
-            },
+            Shape::Product { left, transposed, right } => {
+                Shape::Product { left: factor * left, transposed: *transposed, right: right.clone() }
+            }
+            Shape::Scaled { weights, matrix } => Shape::Scaled { weights: weights.clone(), matrix: factor * matrix },
         };
-        Term {
-            unknown: term.unknown,
-            shape,
-        }
+        Term { unknown: term.unknown, shape }
     });
     Expr::new(factor * &*a.constant, terms.collect())
 }
@@ -59,11 +47,7 @@ fn product_from_right(a: &Expr, b: &Mat<f64>) -> Expr {
 }
 
 fn check_product(a: (usize, usize), b: (usize, usize)) {
-    assert_eq!(
-        a.1, b.0,
-        "product of a {} × {} and a {} × {} matrix",
-        a.0, a.1, b.0, b.1
-    );
+    assert_eq!(a.1, b.0, "product of a {} × {} and a {} × {} matrix", a.0, a.1, b.0, b.1);
 }
 
 /// Writes one operator for the four combinations of owned and borrowed operands.
@@ -100,17 +84,9 @@ macro_rules! binary {
 binary!(Add, add, Expr, Expr, |a, b| sum(a, b, 1.0));
 binary!(Sub, sub, Expr, Expr, |a, b| sum(a, b, -1.0));
 binary!(Add, add, Expr, Mat<f64>, |a, b| sum(a, &Expr::from(b), 1.0));
-binary!(Sub, sub, Expr, Mat<f64>, |a, b| sum(
-    a,
-    &Expr::from(b),
-    -1.0
-));
+binary!(Sub, sub, Expr, Mat<f64>, |a, b| sum(a, &Expr::from(b), -1.0));
 binary!(Add, add, Mat<f64>, Expr, |a, b| sum(&Expr::from(a), b, 1.0));
-binary!(Sub, sub, Mat<f64>, Expr, |a, b| sum(
-    &Expr::from(a),
-    b,
-    -1.0
-));
+binary!(Sub, sub, Mat<f64>, Expr, |a, b| sum(&Expr::from(a), b, -1.0));
 binary!(Mul, mul, Mat<f64>, Expr, |a, b| product_from_left(a, b));
 binary!(Mul, mul, Expr, Mat<f64>, |a, b| product_from_right(a, b));
 

@@ -47,11 +47,7 @@ impl Options {
             if value > 0.0 && value < 1.0 {
                 return Ok(());
             }
-            Err(crate::Error::BadOption {
-                option,
-                value,
-                allowed: "a tolerance lies between 0 and 1",
-            })
+            Err(crate::Error::BadOption { option, value, allowed: "a tolerance lies between 0 and 1" })
         };
         tolerance("gap_tolerance", self.gap_tolerance)?;
         tolerance("feasibility_tolerance", self.feasibility_tolerance)?;

@@ -72,25 +72,12 @@ impl Problem {
 
     /// Demands `F ≻ 0`, posed as `F ⪰ margin·I` with the default margin of [`Options::margin`].
     pub fn positive_definite(&mut self, name: impl Into<String>, expression: impl Into<Expr>) {
-        self.inequalities.push(Inequality {
-            name: name.into(),
-            expression: expression.into(),
-            margin: None,
-        });
+        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: None });
     }
 
     /// Demands `F ⪰ margin·I`.
-    pub fn positive_definite_by(
-        &mut self,
-        name: impl Into<String>,
-        expression: impl Into<Expr>,
-        margin: f64,
-    ) {
-        self.inequalities.push(Inequality {
-            name: name.into(),
-            expression: expression.into(),
-            margin: Some(margin),
-        });
+    pub fn positive_definite_by(&mut self, name: impl Into<String>, expression: impl Into<Expr>, margin: f64) {
+        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: Some(margin) });
     }
 
     /// Sets the objective: the smallest value of a 1 × 1 expression.
@@ -122,13 +109,7 @@ impl Problem {
     /// Infeasible, unbounded and inaccurate are outcomes.
     pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
         options.check()?;
-        let lowered = lower(
-            self.id,
-            &self.unknowns,
-            &self.inequalities,
-            self.objective.as_ref(),
-            options,
-        )?;
+        let lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
         let result = interior_point::solve(&lowered.program, options);
         let translation = Translation {
             layout: &lowered.layout,
@@ -136,25 +117,11 @@ impl Problem {
             objective_constant: lowered.objective_constant,
             sign: lowered.sign,
         };
-        Ok(report(
-            &Stated {
-                problem: self,
-                lowered: &lowered,
-            },
-            &translation,
-            result,
-            options,
-        ))
+        Ok(report(&Stated { problem: self, lowered: &lowered }, &translation, result, options))
     }
 
     fn unknown(&mut self, name: String, rows: usize, cols: usize, symmetric: bool) -> Expr {
-        let unknown = Unknown {
-            problem: self.id,
-            index: self.unknowns.len(),
-            rows,
-            cols,
-            symmetric,
-        };
+        let unknown = Unknown { problem: self.id, index: self.unknowns.len(), rows, cols, symmetric };
         self.names.push(name);
         self.unknowns.push(unknown);
         Expr::unknown(unknown)
@@ -169,12 +136,8 @@ struct Stated<'a> {
 
 impl Original for Stated<'_> {
     fn blocks(&self) -> Vec<BlockReport> {
-        let reports = self
-            .problem
-            .inequalities
-            .iter()
-            .zip(&self.lowered.margins)
-            .map(|(inequality, &margin)| BlockReport {
+        let reports =
+            self.problem.inequalities.iter().zip(&self.lowered.margins).map(|(inequality, &margin)| BlockReport {
                 name: inequality.name.clone(),
                 size: inequality.expression.nrows(),
                 smallest_eigenvalue: f64::NAN,
@@ -184,25 +147,17 @@ impl Original for Stated<'_> {
     }
 
     fn value(&self, block: usize, values: &[Mat<f64>]) -> Mat<f64> {
-        self.problem.inequalities[block]
-            .expression
-            .evaluate(&|unknown| &values[unknown.index])
+        self.problem.inequalities[block].expression.evaluate(&|unknown| &values[unknown.index])
     }
 
     fn objective(&self, values: &[Mat<f64>]) -> f64 {
         let objective = self.problem.objective.as_ref();
-        objective.map_or(0.0, |(_, expression)| {
-            expression.evaluate(&|unknown| &values[unknown.index])[(0, 0)]
-        })
+        objective.map_or(0.0, |(_, expression)| expression.evaluate(&|unknown| &values[unknown.index])[(0, 0)])
     }
 
     fn gradient(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
-        let mut gradients: Vec<Mat<f64>> = self
-            .problem
-            .unknowns
-            .iter()
-            .map(|unknown| Mat::zeros(unknown.rows, unknown.cols))
-            .collect();
+        let mut gradients: Vec<Mat<f64>> =
+            self.problem.unknowns.iter().map(|unknown| Mat::zeros(unknown.rows, unknown.cols)).collect();
         for (inequality, z) in self.problem.inequalities.iter().zip(multipliers) {
             for term in inequality.expression.terms.iter() {
                 gradients[term.unknown.index] += verification::gradient(term, z);
@@ -212,8 +167,6 @@ impl Original for Stated<'_> {
     }
 
     fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {
-        self.problem.inequalities[block]
-            .margin
-            .map(|margin| margin - spectrum.rounding)
+        self.problem.inequalities[block].margin.map(|margin| margin - spectrum.rounding)
     }
 }

@@ -48,24 +48,16 @@ pub(crate) fn report(
             Some(floor) => spectrum.smallest >= floor,
         };
     }
-    let multipliers: Vec<Mat<f64>> = result
-        .point
-        .z
-        .iter()
-        .zip(&blocks)
-        .map(|(z, block)| square(z, block.size))
-        .collect();
+    let multipliers: Vec<Mat<f64>> =
+        result.point.z.iter().zip(&blocks).map(|(z, block)| square(z, block.size)).collect();
     let unverified = Outcome::Inaccurate(InaccurateReason::NotVerified);
     let outcome = match result.ending {
         Ending::Converged if verified => Outcome::Solved,
         Ending::Converged => unverified,
-        Ending::PrimalInfeasible => {
-            witness(original, translation.layout, &blocks, &multipliers, options)
-                .map_or(unverified, Outcome::Infeasible)
-        }
+        Ending::PrimalInfeasible => witness(original, translation.layout, &blocks, &multipliers, options)
+            .map_or(unverified, Outcome::Infeasible),
         Ending::DualInfeasible(direction) => {
-            ray(original, translation, &blocks, &direction, options)
-                .map_or(unverified, Outcome::Unbounded)
+            ray(original, translation, &blocks, &direction, options).map_or(unverified, Outcome::Unbounded)
         }
         Ending::Stopped(reason) => Outcome::Inaccurate(reason),
     };
@@ -93,11 +85,7 @@ pub(crate) fn report(
 
 /// Of a square matrix, or of a diagonal one given as a column.
 fn spectrum(value: &Mat<f64>, size: usize) -> Spectrum {
-    if value.ncols() == size {
-        Spectrum::of(value)
-    } else {
-        Spectrum::of_diagonal(value)
-    }
+    if value.ncols() == size { Spectrum::of(value) } else { Spectrum::of_diagonal(value) }
 }
 
 /// Checks that the multipliers exclude every point, and normalises them.
@@ -113,45 +101,24 @@ fn witness(
     for (index, (block, z)) in blocks.iter().zip(z).enumerate() {
         let c = original.value(index, &zero);
         let diagonal = |i: usize| {
-            if c.ncols() == block.size {
-                c[(i, i)]
-            } else {
-                c[(i, 0)]
-            }
+            if c.ncols() == block.size { c[(i, i)] } else { c[(i, 0)] }
         };
         at_zero += match c.ncols() == block.size {
             true => inner_product(&c, z),
-            false => (0..block.size)
-                .map(|i| diagonal(i) * z[(i, i)])
-                .sum::<f64>(),
+            false => (0..block.size).map(|i| diagonal(i) * z[(i, i)]).sum::<f64>(),
         };
-        at_zero -= (0..block.size)
-            .map(|i| block.margin * z[(i, i)])
-            .sum::<f64>();
+        at_zero -= (0..block.size).map(|i| block.margin * z[(i, i)]).sum::<f64>();
     }
     if at_zero.is_nan() || at_zero >= 0.0 {
         return None;
     }
     let multipliers: Vec<Mat<f64>> = z.iter().map(|z| (-1.0 / at_zero) * z).collect();
-    let residual = original
-        .gradient(&multipliers)
-        .iter()
-        .fold(
-            0.0,
-            |m: f64, g| if g.is_nan() { *g } else { m.max(g.abs()) },
-        );
-    let smallest_eigenvalue = multipliers
-        .iter()
-        .map(|z| Spectrum::of(z).smallest)
-        .fold(f64::INFINITY, f64::min);
+    let residual =
+        original.gradient(&multipliers).iter().fold(0.0, |m: f64, g| if g.is_nan() { *g } else { m.max(g.abs()) });
+    let smallest_eigenvalue = multipliers.iter().map(|z| Spectrum::of(z).smallest).fold(f64::INFINITY, f64::min);
     let scale = multipliers.iter().map(Mat::norm_l2).fold(1.0, f64::max);
-    let holds =
-        residual <= 2.0 * options.feasibility_tolerance && smallest_eigenvalue >= -1e-12 * scale;
-    holds.then_some(Witness {
-        multipliers,
-        residual,
-        smallest_eigenvalue,
-    })
+    let holds = residual <= 2.0 * options.feasibility_tolerance && smallest_eigenvalue >= -1e-12 * scale;
+    holds.then_some(Witness { multipliers, residual, smallest_eigenvalue })
 }
 
 /// Checks that the direction keeps every block positive semidefinite while the objective improves.
@@ -182,8 +149,5 @@ fn ray(
     }
     // A violation of ε means that no objective beyond 1/ε times the data's scale is excluded.
     let holds = smallest >= -options.feasibility_tolerance * largest.max(1.0);
-    holds.then_some(Ray {
-        direction,
-        smallest_eigenvalue: smallest,
-    })
+    holds.then_some(Ray { direction, smallest_eigenvalue: smallest })
 }

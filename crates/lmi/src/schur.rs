@@ -41,8 +41,8 @@ impl Schur {
     }
 
     /// Factorises M. Unknowns that appear nowhere stay where they are; linearly dependent coefficient matrices
-    /// are met by adding to the diagonal, from rounding level upwards. False when M is not finite.
-    pub fn factorize(&mut self) -> bool {
+    /// are met by adding to the (unit) diagonal, from `regularization` or rounding level upwards. False when M is not finite.
+    pub fn factorize(&mut self, regularization: f64) -> bool {
         let n = self.n;
         let largest = (0..n).map(|i| self.matrix[i + i * n]).fold(0.0, f64::max);
         if !largest.is_finite() {
@@ -58,13 +58,11 @@ impl Schur {
             }
             self.scale[i] = 1.0 / diagonal.sqrt();
         }
-        self.regularization = 0.0;
+        self.regularization = regularization;
         loop {
             for j in 0..n {
                 let scale = self.scale[j];
-                let columns = self.factor[j * n + j..(j + 1) * n]
-                    .iter_mut()
-                    .zip(&self.matrix[j * n + j..(j + 1) * n]);
+                let columns = self.factor[j * n + j..(j + 1) * n].iter_mut().zip(&self.matrix[j * n + j..(j + 1) * n]);
                 for ((factor, entry), other) in columns.zip(&self.scale[j..]) {
                     *factor = entry * scale * other;
                 }
@@ -73,11 +71,7 @@ impl Schur {
             if cholesky(n, &mut self.factor, &mut self.scratch) {
                 return true;
             }
-            self.regularization = if self.regularization == 0.0 {
-                1e-16
-            } else {
-                self.regularization * 4.0
-            };
+            self.regularization = if self.regularization == 0.0 { 1e-16 } else { self.regularization * 4.0 };
             if self.regularization > 1e-3 {
                 return false;
             }
@@ -112,10 +106,7 @@ impl Schur {
 
     fn solve_factored(&mut self) {
         let n = self.n;
-        self.correction
-            .iter_mut()
-            .zip(&self.scale)
-            .for_each(|(c, s)| *c *= s);
+        self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
         llt::solve::solve_in_place_with_conj(
             MatRef::from_column_major_slice(&self.factor, n, n),
             Conj::No,
@@ -123,10 +114,7 @@ impl Schur {
             Par::Seq,
             MemStack::new(&mut self.buffer),
         );
-        self.correction
-            .iter_mut()
-            .zip(&self.scale)
-            .for_each(|(c, s)| *c *= s);
+        self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
     }
 
     /// residual = r − M x from the lower triangle.

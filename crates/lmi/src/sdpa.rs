@@ -89,27 +89,11 @@ impl Sdp {
         options.check()?;
         self.check()?;
         let m = self.objective.len();
-        let unknowns = [Unknown {
-            problem: u64::MAX,
-            index: 0,
-            rows: m,
-            cols: 1,
-            symmetric: false,
-        }];
+        let unknowns = [Unknown { problem: u64::MAX, index: 0, rows: m, cols: 1, symmetric: false }];
         let layout = Layout::new(&unknowns);
         let result = interior_point::solve(&self.program(), options);
-        let translation = Translation {
-            layout: &layout,
-            unknowns: &unknowns,
-            objective_constant: 0.0,
-            sign: 1.0,
-        };
-        Ok(report(
-            &Stated { sdp: self, options },
-            &translation,
-            result,
-            options,
-        ))
+        let translation = Translation { layout: &layout, unknowns: &unknowns, objective_constant: 0.0, sign: 1.0 };
+        Ok(report(&Stated { sdp: self, options }, &translation, result, options))
     }
 
     fn check(&self) -> Result<(), Error> {
@@ -117,18 +101,8 @@ impl Sdp {
             return Err(Error::NoConstraint);
         }
         check_size(self.objective.len())?;
-        if let Some((row, &value)) = self
-            .objective
-            .iter()
-            .enumerate()
-            .find(|(_, c)| !c.is_finite())
-        {
-            return Err(Error::NotFinite {
-                place: "the objective".to_owned(),
-                row,
-                column: 0,
-                value,
-            });
+        if let Some((row, &value)) = self.objective.iter().enumerate().find(|(_, c)| !c.is_finite()) {
+            return Err(Error::NotFinite { place: "the objective".to_owned(), row, column: 0, value });
         }
         for c in &self.coefficients {
             let shape = self.blocks.get(c.block).copied();
@@ -136,10 +110,7 @@ impl Sdp {
                 BlockShape::Symmetric(n) => c.row < n && c.column < n,
                 BlockShape::Diagonal(n) => c.row < n && c.column == c.row,
             });
-            if !inside
-                || c.unknown
-                    .is_some_and(|unknown| unknown >= self.objective.len())
-            {
+            if !inside || c.unknown.is_some_and(|unknown| unknown >= self.objective.len()) {
                 return Err(Error::BadCoefficient {
                     matrix: c.unknown.map_or(0, |unknown| unknown + 1),
                     block: c.block,
@@ -148,17 +119,8 @@ impl Sdp {
                 });
             }
             if !c.value.is_finite() {
-                let place = format!(
-                    "block {} of F{}",
-                    c.block + 1,
-                    c.unknown.map_or(0, |unknown| unknown + 1)
-                );
-                return Err(Error::NotFinite {
-                    place,
-                    row: c.row,
-                    column: c.column,
-                    value: c.value,
-                });
+                let place = format!("block {} of F{}", c.block + 1, c.unknown.map_or(0, |unknown| unknown + 1));
+                return Err(Error::NotFinite { place, row: c.row, column: c.column, value: c.value });
             }
         }
         Ok(())
@@ -177,12 +139,7 @@ impl Sdp {
         for c in &self.coefficients {
             let (row, column) = (c.row.max(c.column), c.row.min(c.column));
             match c.unknown {
-                Some(unknown) => entries[c.block].push(Entry {
-                    unknown,
-                    row,
-                    column,
-                    value: c.value,
-                }),
+                Some(unknown) => entries[c.block].push(Entry { unknown, row, column, value: c.value }),
                 None => {
                     let (n, constant) = (self.blocks[c.block].size(), &mut constants[c.block]);
                     if constant.len() == n {
@@ -196,31 +153,21 @@ impl Sdp {
                 }
             }
         }
-        let blocks =
-            self.blocks
-                .iter()
-                .zip(entries)
-                .zip(constants)
-                .map(|((shape, entries), constant)| {
-                    let size = shape.size();
-                    if constant.len() == size {
-                        let mut rows = vec![Vec::new(); size];
-                        entries
-                            .iter()
-                            .for_each(|e| rows[e.row].push((e.unknown, e.value)));
-                        return Block::Diagonal(DiagonalBlock::new(constant, rows));
-                    }
-                    Block::Dense(DenseBlock {
-                        size,
-                        constant,
-                        factored: Factored::default(),
-                        sparse: Sparse::new(size, entries),
-                    })
-                });
-        Program {
-            objective: self.objective.clone(),
-            blocks: blocks.collect(),
-        }
+        let blocks = self.blocks.iter().zip(entries).zip(constants).map(|((shape, entries), constant)| {
+            let size = shape.size();
+            if constant.len() == size {
+                let mut rows = vec![Vec::new(); size];
+                entries.iter().for_each(|e| rows[e.row].push((e.unknown, e.value)));
+                return Block::Diagonal(DiagonalBlock::new(constant, rows));
+            }
+            Block::Dense(DenseBlock {
+                size,
+                constant,
+                factored: Factored::default(),
+                sparse: Sparse::new(size, entries),
+            })
+        });
+        Program { objective: self.objective.clone(), blocks: blocks.collect() }
     }
 }
 
@@ -246,9 +193,7 @@ impl Original for Stated<'_> {
         let diagonal = matches!(shape, BlockShape::Diagonal(_));
         let mut value = Mat::zeros(shape.size(), if diagonal { 1 } else { shape.size() });
         for c in self.sdp.coefficients.iter().filter(|c| c.block == block) {
-            let term = c
-                .unknown
-                .map_or(-c.value, |unknown| c.value * values[0][(unknown, 0)]);
+            let term = c.unknown.map_or(-c.value, |unknown| c.value * values[0][(unknown, 0)]);
             if diagonal {
                 value[(c.row, 0)] += term;
             } else {
@@ -262,12 +207,7 @@ impl Original for Stated<'_> {
     }
 
     fn objective(&self, values: &[Mat<f64>]) -> f64 {
-        self.sdp
-            .objective
-            .iter()
-            .enumerate()
-            .map(|(i, c)| c * values[0][(i, 0)])
-            .sum()
+        self.sdp.objective.iter().enumerate().map(|(i, c)| c * values[0][(i, 0)]).sum()
     }
 
     fn gradient(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
@@ -282,14 +222,8 @@ impl Original for Stated<'_> {
     }
 
     fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {
-        let constant = self
-            .sdp
-            .coefficients
-            .iter()
-            .filter(|c| c.block == block && c.unknown.is_none());
-        let square: f64 = constant
-            .map(|c| c.value * c.value * if c.row == c.column { 1.0 } else { 2.0 })
-            .sum();
+        let constant = self.sdp.coefficients.iter().filter(|c| c.block == block && c.unknown.is_none());
+        let square: f64 = constant.map(|c| c.value * c.value * if c.row == c.column { 1.0 } else { 2.0 }).sum();
         Some(-self.options.feasibility_tolerance * (1.0 + square.sqrt()) - spectrum.rounding)
     }
 }

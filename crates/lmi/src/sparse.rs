@@ -6,6 +6,7 @@
 //! is made for the matrix with more entries. Only the rows where F_i is not zero enter the products.
 
 use crate::dense;
+use crate::vectorized::vectorized;
 
 /// One entry in the lower triangle of a coefficient matrix (and its mirror image).
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +27,8 @@ struct Coefficient {
     support: Vec<usize>,
     /// The entries of the full symmetric matrix as (place in `support`, column, value).
     full: Vec<(usize, usize, f64)>,
+    /// Where its weights begin among those of the block.
+    start: usize,
     /// Whether the whole product H is formed.
     whole: bool,
 }
@@ -34,8 +37,14 @@ struct Coefficient {
 #[derive(Debug, Default)]
 pub(crate) struct Sparse {
     n: usize,
+    /// By falling number of entries.
     coefficients: Vec<Coefficient>,
+    /// All entries in that order, as ⟨F, H⟩ for symmetric H needs them: (place in the lower triangle of H, value, doubled off the diagonal).
+    weights: Vec<(u32, f64)>,
 }
+
+/// What is done with each product H of a block that is not sparse alone.
+pub(crate) type Mixed<'a> = &'a mut dyn FnMut(usize, &[f64], &mut [f64]);
 
 /// Scratch memory, reused in every iteration.
 #[derive(Debug, Default)]
@@ -74,22 +83,22 @@ impl Sparse {
                 }
             }
             let unknown = group[0].unknown;
-            coefficients.push(Coefficient {
-                unknown,
-                entries: merged,
-                support,
-                full,
-                whole: false,
-            });
+            coefficients.push(Coefficient { unknown, entries: merged, support, full, start: 0, whole: false });
         }
         coefficients.sort_by_key(|c| std::cmp::Reverse(c.entries.len()));
         let mut remaining: usize = coefficients.iter().map(|c| c.entries.len()).sum();
+        let mut weights = Vec::with_capacity(remaining);
         for c in &mut coefficients {
             let k = c.support.len();
-            c.whole = n * n * k + 2 * remaining < 2 * k * remaining + k * n;
+            // Operations, those of the dense product counted by vectors of about six.
+            c.whole = n * n * (k + 6) / 6 + remaining < 2 * k * remaining;
             remaining -= c.entries.len();
+            c.start = weights.len();
+            let weight =
+                |&(i, j, value): &(usize, usize, f64)| ((i + j * n) as u32, if i == j { value } else { 2.0 * value });
+            weights.extend(c.entries.iter().map(weight));
         }
-        Self { n, coefficients }
+        Self { n, coefficients, weights }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -101,11 +110,7 @@ impl Sparse {
             return SparseScratch::default();
         }
         let square = self.n * self.n;
-        SparseScratch {
-            fz: vec![0.0; square],
-            p_rows: vec![0.0; square],
-            h: vec![0.0; square],
-        }
+        SparseScratch { fz: vec![0.0; square], p_rows: vec![0.0; square], h: vec![0.0; square] }
     }
 
     /// out ← out + F(x) − F(0).
@@ -127,32 +132,32 @@ impl Sparse {
             let inner: f64 = c
                 .entries
                 .iter()
-                .map(|&(i, j, value)| {
-                    if i == j {
-                        value * h[i + j * self.n]
-                    } else {
-                        2.0 * value * h[i + j * self.n]
-                    }
-                })
+                .map(|&(i, j, value)| if i == j { value * h[i + j * self.n] } else { 2.0 * value * h[i + j * self.n] })
                 .sum();
             out[c.unknown] += factor * inner;
         }
     }
 
-    /// out_i ← max(out_i, ‖F_i‖_F).
-    pub fn norms(&self, out: &mut [f64]) {
+    /// out_i ← max(out_i, ‖D F_i D‖_F) for a diagonal D.
+    pub fn norms(&self, d: &[f64], out: &mut [f64]) {
         for c in &self.coefficients {
-            let square: f64 = c
-                .entries
-                .iter()
-                .map(|&(i, j, v)| if i == j { v * v } else { 2.0 * v * v })
-                .sum();
-            out[c.unknown] = out[c.unknown].max(square.sqrt());
+            let square = |&(i, j, v): &(usize, usize, f64)| (v * d[i] * d[j]).powi(2) * if i == j { 1.0 } else { 2.0 };
+            let sum: f64 = c.entries.iter().map(square).sum();
+            out[c.unknown] = out[c.unknown].max(sum.sqrt());
         }
     }
 
-    /// M ← M + tr(F_i P F_j Z) over the sparse unknowns, lower triangle. For each of them `mixed` is called with
-    /// the unknown and the symmetrised H = P F_i Z when `wants_product`.
+    /// out_jk ← max(out_jk, |F_i,jk|) over all i.
+    pub fn magnitudes(&self, out: &mut [f64]) {
+        for &(i, j, value) in self.coefficients.iter().flat_map(|c| &c.entries) {
+            for at in [i + j * self.n, j + i * self.n] {
+                out[at] = out[at].max(value.abs());
+            }
+        }
+    }
+
+    /// M ← M + tr(F_i P F_j Z) over the sparse unknowns, lower triangle. If given, `mixed` is called for each of them with
+    /// the unknown, the symmetrised H = P F_i Z and M.
     pub fn schur(
         &self,
         p: &[f64],
@@ -160,56 +165,53 @@ impl Sparse {
         m: &mut [f64],
         unknowns: usize,
         scratch: &mut SparseScratch,
-        wants_product: bool,
-        mut mixed: impl FnMut(usize, &[f64], &mut [f64]),
+        mut mixed: Option<Mixed<'_>>,
     ) {
         let n = self.n;
         let SparseScratch { fz, p_rows, h } = scratch;
         for (at, c) in self.coefficients.iter().enumerate() {
             let k = c.support.len();
             let (fz, p_rows) = (&mut fz[..k * n], &mut p_rows[..k * n]);
-            // Rows of F_i Z and of P on the support, stored so that the inner products below run contiguously.
-            fz.fill(0.0);
-            for &(row, column, value) in &c.full {
-                for (j, z) in z[column * n..(column + 1) * n].iter().enumerate() {
-                    fz[row + j * k] += value * z;
-                }
+            product_rows(n, &c.full, z, fz);
+            for (row, &i) in p_rows.chunks_exact_mut(n).zip(&c.support) {
+                row.copy_from_slice(&p[i * n..(i + 1) * n]);
             }
-            for (row, &i) in c.support.iter().enumerate() {
-                for (j, p) in p[i * n..(i + 1) * n].iter().enumerate() {
-                    p_rows[row + j * k] = *p;
-                }
-            }
-            let whole = c.whole || wants_product;
-            if whole {
-                dense::multiply_transposed(k, n, p_rows, fz, h);
-            }
-            if wants_product {
-                dense::symmetrize(n, h);
-                mixed(c.unknown, h, m);
-            }
-            let inner = |i: usize, j: usize| {
-                if whole {
-                    h[i + j * n]
-                } else {
-                    dense::dot(&p_rows[i * k..(i + 1) * k], &fz[j * k..(j + 1) * k])
-                }
-            };
-            for other in &self.coefficients[at..] {
-                let sum: f64 = other
-                    .entries
-                    .iter()
-                    .map(|&(i, j, value)| {
-                        if i == j {
-                            value * inner(i, i)
-                        } else {
-                            value * (inner(i, j) + inner(j, i))
-                        }
-                    })
-                    .sum();
+            let targets = self.coefficients[at..].iter();
+            let place = |other: &Coefficient| {
                 let (low, high) = (c.unknown.min(other.unknown), c.unknown.max(other.unknown));
-                m[high + low * unknowns] += sum;
+                high + low * unknowns
+            };
+            if c.whole || mixed.is_some() {
+                dense::multiply_transposed(k, n, p_rows, fz, h);
+                dense::symmetrize(n, h);
+                if let Some(mixed) = &mut mixed {
+                    mixed(c.unknown, h, m);
+                }
+                for other in targets {
+                    let weights = &self.weights[other.start..other.start + other.entries.len()];
+                    m[place(other)] += weights.iter().map(|&(at, weight)| weight * h[at as usize]).sum::<f64>();
+                }
+                continue;
             }
+            let inner = |i: usize, j: usize| -> f64 {
+                p_rows.chunks_exact(n).zip(fz.chunks_exact(n)).map(|(p, fz)| p[i] * fz[j]).sum()
+            };
+            for other in targets {
+                let entry = |&(i, j, value): &(usize, usize, f64)| {
+                    if i == j { value * inner(i, i) } else { value * (inner(i, j) + inner(j, i)) }
+                };
+                m[place(other)] += other.entries.iter().map(entry).sum::<f64>();
+            }
+        }
+    }
+}
+
+vectorized! {
+    /// The rows of F Z on the support of F, one after the other.
+    fn product_rows<'a>(n: usize, full: &'a [(usize, usize, f64)], z: &'a [f64], out: &'a mut [f64]) {
+        out.fill(0.0);
+        for &(row, column, value) in full {
+            dense::axpy(value, &z[column * n..(column + 1) * n], &mut out[row * n..(row + 1) * n]);
         }
     }
 }

@@ -17,18 +17,10 @@ impl Spectrum {
     pub fn of(matrix: &Mat<f64>) -> Self {
         let n = matrix.nrows();
         if n == 0 {
-            return Self {
-                smallest: f64::INFINITY,
-                largest: f64::NEG_INFINITY,
-                rounding: 0.0,
-            };
+            return Self { smallest: f64::INFINITY, largest: f64::NEG_INFINITY, rounding: 0.0 };
         }
         let symmetric = Mat::from_fn(n, n, |i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)]));
-        let failed = Self {
-            smallest: f64::NAN,
-            largest: f64::NAN,
-            rounding: f64::NAN,
-        };
+        let failed = Self { smallest: f64::NAN, largest: f64::NAN, rounding: f64::NAN };
         if !largest_entry(&symmetric).is_finite() {
             return failed;
         }
@@ -37,11 +29,7 @@ impl Spectrum {
                 let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
                 let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
                 let rounding = 4.0 * n as f64 * f64::EPSILON * smallest.abs().max(largest.abs());
-                Self {
-                    smallest,
-                    largest,
-                    rounding,
-                }
+                Self { smallest, largest, rounding }
             }
             Err(_) => failed,
         }
@@ -53,20 +41,12 @@ impl Spectrum {
         for i in 0..column.nrows() {
             let entry = column[(i, 0)];
             if entry.is_nan() {
-                return Self {
-                    smallest: f64::NAN,
-                    largest: f64::NAN,
-                    rounding: f64::NAN,
-                };
+                return Self { smallest: f64::NAN, largest: f64::NAN, rounding: f64::NAN };
             }
             smallest = smallest.min(entry);
             largest = largest.max(entry);
         }
-        Self {
-            smallest,
-            largest,
-            rounding: f64::EPSILON * smallest.abs().max(largest.abs()),
-        }
+        Self { smallest, largest, rounding: f64::EPSILON * smallest.abs().max(largest.abs()) }
     }
 }
 
@@ -74,16 +54,8 @@ impl Spectrum {
 pub(crate) fn gradient(term: &Term, z: &Mat<f64>) -> Mat<f64> {
     match &term.shape {
         // ⟨Z, U X V⟩ = ⟨Uᵀ Z Vᵀ, X⟩ and ⟨Z, U Xᵀ V⟩ = ⟨V Zᵀ U, X⟩.
-        Shape::Product {
-            left,
-            transposed: false,
-            right,
-        } => left.transpose() * z * right.transpose(),
-        Shape::Product {
-            left,
-            transposed: true,
-            right,
-        } => right * z.transpose() * left,
+        Shape::Product { left, transposed: false, right } => left.transpose() * z * right.transpose(),
+        Shape::Product { left, transposed: true, right } => right * z.transpose() * left,
         Shape::Scaled { weights, matrix } => crate::expression::inner_product(matrix, z) * weights,
     }
 }

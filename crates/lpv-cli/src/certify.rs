@@ -29,30 +29,23 @@ struct Certificate<'a> {
 /// Check the design; anything worse than `numerical` is a failure.
 pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     let design = designs::from_json(&arguments.design, &read_text(&arguments.design)?)?;
-    let plant = design.plant.build().map_err(|error| Failure::Unreadable {
-        file: arguments.design.clone(),
-        message: error.to_string(),
-    })?;
+    let plant = design
+        .plant
+        .build()
+        .map_err(|error| Failure::Unreadable { file: arguments.design.clone(), message: error.to_string() })?;
     let claims = check(&design, &*plant);
     let verdict = designs::worst(&claims);
     if arguments.json {
-        let certificate = Certificate {
-            design: &design.name,
-            verdict,
-            claims: &claims,
-        };
-        let json = serde_json::to_string_pretty(&certificate)
-            .map_err(|error| Failure::serialisation(&error))?;
+        let certificate = Certificate { design: &design.name, verdict, claims: &claims };
+        let json = serde_json::to_string_pretty(&certificate).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;
     } else {
         print(&designs::text(&design.name, &claims))?;
     }
     match verdict {
         Verdict::Proved | Verdict::Numerical => Ok(()),
-        Verdict::Refuted | Verdict::Undecided => Err(Failure::NotCertified(format!(
-            "\"{}\" is {}",
-            design.name,
-            verdict.word()
-        ))),
+        Verdict::Refuted | Verdict::Undecided => {
+            Err(Failure::NotCertified(format!("\"{}\" is {}", design.name, verdict.word())))
+        }
     }
 }

@@ -28,24 +28,16 @@ pub struct DesignArguments {
 /// Design every controller of the scenario.
 pub fn run(arguments: &DesignArguments) -> Result<(), Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
-    let place = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| scenario.designs_folder());
+    let place = arguments.out.clone().unwrap_or_else(|| scenario.designs_folder());
     let folder = ResultFolder::begin(&place, arguments.force)?;
     let checked = designs::design_all(&scenario)?;
     for checked in &checked {
-        folder.write(
-            &designs::file_name(&checked.design.name),
-            &designs::to_json(&checked.design)?,
-        )?;
+        folder.write(&designs::file_name(&checked.design.name), &designs::to_json(&checked.design)?)?;
     }
     let place = folder.finish()?;
     if arguments.json {
-        let summaries: Vec<DesignSummary> =
-            checked.iter().map(|checked| checked.summary()).collect();
-        let json = serde_json::to_string_pretty(&summaries)
-            .map_err(|error| Failure::serialisation(&error))?;
+        let summaries: Vec<DesignSummary> = checked.iter().map(|checked| checked.summary()).collect();
+        let json = serde_json::to_string_pretty(&summaries).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;
     } else {
         for (plan, checked) in scenario.controllers.iter().zip(&checked) {

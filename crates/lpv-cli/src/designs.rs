@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::progress;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, engineers_words};
 use lpv::certificate::{Claim, Verdict, check};
 use lpv::synthesis::{Design, DesignRequest, SynthesisError, design};
 use serde::Serialize;
@@ -64,23 +64,14 @@ pub struct DesignSummary<'a> {
 
 /// The worst verdict of some claims; `undecided` for none.
 pub fn worst(claims: &[Claim]) -> Verdict {
-    claims
-        .iter()
-        .map(|claim| claim.verdict)
-        .min()
-        .unwrap_or(Verdict::Undecided)
+    claims.iter().map(|claim| claim.verdict).min().unwrap_or(Verdict::Undecided)
 }
 
 /// The claims about the design called `label`, as text, a line each.
 pub fn text(label: &str, claims: &[Claim]) -> String {
     let mut text = format!("{label}: {}\n", worst(claims).word());
     for claim in claims {
-        text.push_str(&format!(
-            "  {}: {} ({})\n",
-            claim.verdict.word(),
-            claim.claim,
-            claim.detail
-        ));
+        text.push_str(&format!("  {}: {} ({})\n", claim.verdict.word(), claim.claim, claim.detail));
     }
     text
 }
@@ -91,24 +82,16 @@ pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
     let mut finished: Vec<(DesignRequest, CheckedDesign)> = Vec::new();
     for controller in &scenario.controllers {
         let request = &controller.request;
-        let shared = finished
-            .iter()
-            .find(|(earlier, _)| same_but_name(earlier, request))
-            .map(|(_, checked)| checked);
+        let shared = finished.iter().find(|(earlier, _)| same_but_name(earlier, request)).map(|(_, checked)| checked);
         let checked = match shared {
             Some(earlier) => CheckedDesign {
-                design: Design {
-                    name: request.name.clone(),
-                    ..earlier.design.clone()
-                },
+                design: Design { name: request.name.clone(), ..earlier.design.clone() },
                 claims: earlier.claims.clone(),
                 design_seconds: 0.0,
                 check_seconds: 0.0,
             },
-            None => design_one(scenario, request).map_err(|source| Failure::Synthesis {
-                controller: request.name.clone(),
-                source,
-            })?,
+            None => design_one(scenario, request)
+                .map_err(|source| Failure::Synthesis { controller: request.name.clone(), source })?,
         };
         finished.push((request.clone(), checked));
     }
@@ -120,31 +103,17 @@ fn same_but_name(a: &DesignRequest, b: &DesignRequest) -> bool {
     a.method == b.method && a.schedule == b.schedule && a.limits == b.limits
 }
 
-fn design_one(
-    scenario: &Scenario,
-    request: &DesignRequest,
-) -> Result<CheckedDesign, SynthesisError> {
-    let grid_points = if scenario.plant.description().scheduling.is_some() {
-        request.grid_points
-    } else {
-        1
-    };
+fn design_one(scenario: &Scenario, request: &DesignRequest) -> Result<CheckedDesign, SynthesisError> {
+    let grid_points = if scenario.plant.description().scheduling.is_some() { request.grid_points } else { 1 };
     let bar = progress::bar(&format!("design {}", request.name), grid_points);
     let started = Instant::now();
-    let design = design(&scenario.plant_spec, &*scenario.plant, request, &|done| {
-        bar.set_position(done as u64)
-    })?;
+    let design = design(&scenario.plant_spec, &*scenario.plant, request, &|done| bar.set_position(done as u64))?;
     let design_seconds = started.elapsed().as_secs_f64();
     bar.set_message(format!("check {}", request.name));
     let started = Instant::now();
     let claims = check(&design, &*scenario.plant);
     bar.finish_and_clear();
-    Ok(CheckedDesign {
-        design,
-        claims,
-        design_seconds,
-        check_seconds: started.elapsed().as_secs_f64(),
-    })
+    Ok(CheckedDesign { design, claims, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
 }
 
 /// The JSON file of a design.
@@ -156,15 +125,15 @@ pub fn to_json(design: &Design) -> Result<Vec<u8>, Failure> {
 
 /// Read a design from `text` of `file`.
 pub fn from_json(file: &std::path::Path, text: &str) -> Result<Design, Failure> {
-    let unreadable = |message: String| Failure::Unreadable {
-        file: file.to_owned(),
-        message,
-    };
-    let design: Design = serde_json::from_str(text)
-        .map_err(|error| unreadable(format!("is not a design: {error}")))?;
-    design
-        .validate()
-        .map_err(|error| unreadable(format!("is not a usable design: {error}")))?;
+    let unreadable = |message: String| Failure::Unreadable { file: file.to_owned(), message };
+    let design: Design = serde_json::from_str(text).map_err(|error| {
+        let message = engineers_words(&error.to_string());
+        unreadable(format!("is not a design: {message}"))
+    })?;
+    if design.name.chars().any(char::is_control) {
+        return Err(unreadable("name: has a control character".into()));
+    }
+    design.validate().map_err(|error| unreadable(format!("is not a usable design: {error}")))?;
     Ok(design)
 }
 

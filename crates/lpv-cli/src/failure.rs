@@ -53,37 +53,22 @@ impl Failure {
     pub fn exit_code(&self) -> u8 {
         match self {
             Failure::Synthesis {
-                source:
-                    SynthesisError::Problem(lmi::Error::NotFinite { .. } | lmi::Error::TooLarge { .. }),
+                source: SynthesisError::Problem(lmi::Error::NotFinite { .. } | lmi::Error::TooLarge { .. }),
                 ..
             } => 2,
-            Failure::Defect(_)
-            | Failure::Synthesis {
-                source: SynthesisError::Problem(_),
-                ..
-            } => 1,
+            Failure::Defect(_) | Failure::Synthesis { source: SynthesisError::Problem(_), .. } => 1,
             Failure::BadInput { .. }
             | Failure::Unreadable { .. }
             | Failure::Output { .. }
-            | Failure::Synthesis {
-                source: SynthesisError::UnlimitedInput { .. },
-                ..
-            } => 2,
-            Failure::NotCertified(_)
-            | Failure::Synthesis {
-                source: SynthesisError::Inaccurate { .. },
-                ..
-            } => 4,
+            | Failure::Synthesis { source: SynthesisError::UnlimitedInput { .. }, .. } => 2,
+            Failure::NotCertified(_) | Failure::Synthesis { source: SynthesisError::Inaccurate { .. }, .. } => 4,
             Failure::Synthesis { .. } => 3,
         }
     }
 
     /// A failure to write or read `path`.
     pub fn io(path: &Path, error: &std::io::Error) -> Self {
-        Failure::Output {
-            path: path.to_owned(),
-            message: error.to_string(),
-        }
+        Failure::Output { path: path.to_owned(), message: error.to_string() }
     }
 
     /// Serialising plain data cannot fail; if it does, that is ours.

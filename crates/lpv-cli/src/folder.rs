@@ -20,10 +20,7 @@ impl ResultFolder {
     /// `place` holds something and `replace` is not set, or it holds something that is no result of this program, or
     /// the folder cannot be created. Nothing is changed then.
     pub fn begin(place: &Path, replace: bool) -> Result<Self, Failure> {
-        let unusable = || Failure::Output {
-            path: place.to_owned(),
-            message: "is not a folder name".into(),
-        };
+        let unusable = || Failure::Output { path: place.to_owned(), message: "is not a folder name".into() };
         let name = place.file_name().ok_or_else(unusable)?.to_string_lossy();
         let folder = Self {
             partial: place.with_file_name(format!(".{name}.partial-{}", std::process::id())),
@@ -53,9 +50,7 @@ impl ResultFolder {
     pub fn finish(self) -> Result<PathBuf, Failure> {
         // somebody else may have finished there since the beginning
         self.may_be_taken()?;
-        let aside = self
-            .partial
-            .with_extension(format!("replaced-{}", std::process::id()));
+        let aside = self.partial.with_extension(format!("replaced-{}", std::process::id()));
         let replaces = self.place.exists();
         if replaces {
             fs::rename(&self.place, &aside).map_err(|error| self.failed(&error))?;
@@ -75,12 +70,7 @@ impl ResultFolder {
     /// Whether the result may stand at its place: nothing is there, or an empty folder, or an earlier result that is to be
     /// replaced. A folder with anything else in it is never deleted.
     fn may_be_taken(&self) -> Result<(), Failure> {
-        let refuse = |message: String| {
-            Err(Failure::Output {
-                path: self.place.clone(),
-                message,
-            })
-        };
+        let refuse = |message: String| Err(Failure::Output { path: self.place.clone(), message });
         let entries = match fs::read_dir(&self.place) {
             Ok(entries) => entries,
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -94,18 +84,13 @@ impl ResultFolder {
             let name = entry.map_err(|error| self.failed(&error))?.file_name();
             let name = name.to_string_lossy();
             if !is_result(&name) {
-                return refuse(format!(
-                    "holds \"{name}\", which is no result of lpv; give --out another folder"
-                ));
+                return refuse(format!("holds \"{name}\", which is no result of lpv; give --out another folder"));
             }
             earlier = true;
         }
         match earlier && !self.replace {
             false => Ok(()),
-            true => refuse(
-                "holds an earlier result; give --force to replace it, or --out another folder"
-                    .into(),
-            ),
+            true => refuse("holds an earlier result; give --force to replace it, or --out another folder".into()),
         }
     }
 
@@ -131,9 +116,7 @@ impl ResultFolder {
 /// Whether a file of this name is one that this program writes.
 fn is_result(name: &str) -> bool {
     let is = |start: &str, end: &str| name.starts_with(start) && name.ends_with(end);
-    ["run.json", "report.html"].contains(&name)
-        || is("design-", ".json")
-        || is("trajectory-", ".csv")
+    ["run.json", "report.html"].contains(&name) || is("design-", ".json") || is("trajectory-", ".csv")
 }
 
 impl Drop for ResultFolder {

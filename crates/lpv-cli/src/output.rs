@@ -19,9 +19,7 @@ pub fn print(text: &str) -> Result<(), Failure> {
         })
         .and_then(|()| out.flush());
     match written {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure::io(Path::new("standard output"), &error))
-        }
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::io(Path::new("standard output"), &error)),
         _ => Ok(()),
     }
 }

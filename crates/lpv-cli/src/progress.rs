@@ -7,7 +7,5 @@ pub fn bar(label: &str, length: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg:28} [{bar:32}] {pos}/{len} {elapsed}")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("=> ");
-    ProgressBar::new(length as u64)
-        .with_style(style)
-        .with_message(label.to_owned())
+    ProgressBar::new(length as u64).with_style(style).with_message(label.to_owned())
 }

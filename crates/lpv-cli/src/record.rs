@@ -4,7 +4,7 @@ use crate::designs::CheckedDesign;
 use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::scenario::Scenario;
-use lpv::certificate::{Claim, Verdict};
+use lpv::certificate::{Claim, StepBound, Verdict};
 use lpv::estimator::Consistency;
 use lpv::sim::{Outcome, Performance};
 use lpv::synthesis::Method;
@@ -41,9 +41,7 @@ pub fn trajectory_csv(scenario: &Scenario, flown: &Flown) -> String {
     }
     csv.push_str(",limited,cost\n");
 
-    let stride = (scenario.record_interval_s / scenario.sample_time_s)
-        .round()
-        .max(1.0) as usize;
+    let stride = (scenario.record_interval_s / scenario.sample_time_s).round().max(1.0) as usize;
     for k in (0..trajectory.time_s.len()).step_by(stride) {
         // sample times are multiples of T: round away what the multiplication left behind
         let _ = write!(csv, "{}", (trajectory.time_s[k] * 1e9).round() / 1e9);
@@ -62,12 +60,7 @@ pub fn trajectory_csv(scenario: &Scenario, flown: &Flown) -> String {
             values(&trajectory.estimates[k]);
             values(&trajectory.deviations[k]);
         }
-        let _ = writeln!(
-            csv,
-            ",{},{}",
-            u8::from(trajectory.saturated[k]),
-            trajectory.cost[k]
-        );
+        let _ = writeln!(csv, ",{},{}", u8::from(trajectory.saturated[k]), trajectory.cost[k]);
     }
     csv
 }
@@ -104,6 +97,8 @@ pub struct ControllerRecord<'a> {
     /// The verdict on that bound, for this flight.
     guaranteed_cost_verdict: Verdict,
     flight_claims: &'a [Claim],
+    /// The bound of each step, with the conditions that it does not meet.
+    step_bounds: &'a [StepBound],
     outcome: &'a Outcome,
     #[serde(flatten)]
     performance: &'a Performance,
@@ -117,12 +112,7 @@ pub struct ControllerRecord<'a> {
 
 impl<'a> RunRecord<'a> {
     /// The record of a run that took `seconds`.
-    pub fn new(
-        scenario: &'a Scenario,
-        designs: &'a [CheckedDesign],
-        flights: &'a [Flown],
-        seconds: f64,
-    ) -> Self {
+    pub fn new(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a [Flown], seconds: f64) -> Self {
         let controllers = (scenario.controllers.iter().zip(designs).zip(flights))
             .map(|((plan, checked), flown)| ControllerRecord {
                 name: &plan.request.name,
@@ -133,15 +123,11 @@ impl<'a> RunRecord<'a> {
                 guaranteed_cost: flown.guaranteed_cost(),
                 guaranteed_cost_verdict: bound_verdict(checked, flown),
                 flight_claims: &flown.claims,
+                step_bounds: &flown.bounds,
                 outcome: &flown.flight.outcome,
                 performance: &flown.performance,
                 estimator_consistency: flown.flight.consistency.as_ref(),
-                trace_y: checked
-                    .design
-                    .points
-                    .iter()
-                    .map(|point| point.trace_y)
-                    .collect(),
+                trace_y: checked.design.points.iter().map(|point| point.trace_y).collect(),
                 design_seconds: checked.design_seconds,
                 check_seconds: checked.check_seconds,
                 flight_seconds: flown.seconds,
@@ -164,8 +150,7 @@ impl<'a> RunRecord<'a> {
 
     /// As JSON text.
     pub fn to_json(&self) -> Result<String, Failure> {
-        let mut json =
-            serde_json::to_string_pretty(self).map_err(|error| Failure::serialisation(&error))?;
+        let mut json = serde_json::to_string_pretty(self).map_err(|error| Failure::serialisation(&error))?;
         json.push('\n');
         Ok(json)
     }

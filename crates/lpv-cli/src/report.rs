@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::record::bound_verdict;
 use crate::scenario::{ControllerPlan, Scenario};
-use lpv::certificate::{Claim, Verdict};
+use lpv::certificate::{Claim, StepBound, UnmetCondition, Verdict};
 use lpv::model::BoxWeights;
 use lpv::plant::{Description, Scene};
 use lpv::sim::{Outcome, Trajectory};
@@ -89,11 +89,7 @@ struct RunData<'a> {
 #[serde(tag = "kind", rename_all = "kebab-case")]
 enum OutcomeData {
     Completed,
-    Diverged {
-        time_s: f64,
-        state: String,
-        detail: String,
-    },
+    Diverged { time_s: f64, state: String, detail: String },
 }
 
 #[derive(Serialize)]
@@ -110,41 +106,25 @@ struct EstimationData {
 }
 
 /// The page for a run.
-pub fn html(
-    scenario: &Scenario,
-    designs: &[CheckedDesign],
-    flights: &[Flown],
-) -> Result<String, Failure> {
-    let data = serde_json::to_string(&report(scenario, designs, flights))
-        .map_err(|error| Failure::serialisation(&error))?;
+pub fn html(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> Result<String, Failure> {
+    let data =
+        serde_json::to_string(&report(scenario, designs, flights)).map_err(|error| Failure::serialisation(&error))?;
     if !PAGE.contains(PLACEHOLDER) {
-        return Err(Failure::Defect(
-            "the report page has no place for its data".into(),
-        ));
+        return Err(Failure::Defect("the report page has no place for its data".into()));
     }
     // "</script" and "<!--" inside a string would end the element that holds the data, or never let it end; "<" stands
     // in strings only
     Ok(PAGE.replacen(PLACEHOLDER, &data.replace('<', "\\u003c"), 1))
 }
 
-fn report<'a>(
-    scenario: &'a Scenario,
-    designs: &'a [CheckedDesign],
-    flights: &'a [Flown],
-) -> Report<'a> {
+fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a [Flown]) -> Report<'a> {
     let description = scenario.plant.description();
     let samples = (scenario.duration_s / scenario.sample_time_s).round() as usize + 1;
     let shown: Vec<usize> = (0..samples).step_by(samples.div_ceil(SAMPLES)).collect();
-    let time: Vec<f64> = shown
-        .iter()
-        .map(|&k| significant(k as f64 * scenario.sample_time_s))
-        .collect();
+    let time: Vec<f64> = shown.iter().map(|&k| significant(k as f64 * scenario.sample_time_s)).collect();
     let moved = scenario.reference.moved_states();
     let references: Vec<Vec<f64>> = time.iter().map(|&t| scenario.reference.at(t)).collect();
-    let weights = description
-        .scheduling
-        .as_ref()
-        .map(|scheduling| BoxWeights::new(&scheduling.features));
+    let weights = description.scheduling.as_ref().map(|scheduling| BoxWeights::new(&scheduling.features));
     Report {
         schema: "lpv-report/1",
         title: &scenario.title,
@@ -160,68 +140,30 @@ fn report<'a>(
             scene: description.scene.as_ref(),
         },
         scheduling: SchedulingData {
-            parameter: description
-                .scheduling
-                .as_ref()
-                .map_or(String::new(), |s| s.parameter.clone()),
-            unit: description
-                .scheduling
-                .as_ref()
-                .map_or(String::new(), |s| s.unit.clone()),
-            weights: (1..=weights.as_ref().map_or(0, |w| w.corners.len()))
-                .map(|i| format!("rho_{i}"))
-                .collect(),
+            parameter: description.scheduling.as_ref().map_or(String::new(), |s| s.parameter.clone()),
+            unit: description.scheduling.as_ref().map_or(String::new(), |s| s.unit.clone()),
+            weights: (1..=weights.as_ref().map_or(0, |w| w.corners.len())).map(|i| format!("rho_{i}")).collect(),
         },
         reference: (0..description.states.len())
             .map(|i| {
                 let shown = is_output(description, i) || moved.contains(&i);
-                shown.then(|| {
-                    references
-                        .iter()
-                        .map(|reference| Some(significant(reference[i])))
-                        .collect()
-                })
+                shown.then(|| references.iter().map(|reference| Some(significant(reference[i]))).collect())
             })
             .collect(),
         time,
-        steps: (scenario
-            .reference
-            .set_points()
-            .iter()
-            .zip(&scenario.set_point_labels))
-        .map(|(set_point, label)| StepData {
-            time_s: set_point.time_s,
-            label,
-        })
-        .collect(),
-        runs: (scenario
-            .controllers
-            .iter()
-            .zip(designs)
-            .zip(flights)
-            .enumerate())
-        .map(|(k, ((plan, checked), flown))| {
-            run(
-                description,
-                &shown,
-                weights.as_ref(),
-                k,
-                plan,
-                checked,
-                flown,
-            )
-        })
-        .collect(),
+        steps: (scenario.reference.set_points().iter().zip(&scenario.set_point_labels))
+            .map(|(set_point, label)| StepData { time_s: set_point.time_s, label })
+            .collect(),
+        runs: (scenario.controllers.iter().zip(designs).zip(flights).enumerate())
+            .map(|(k, ((plan, checked), flown))| run(description, &shown, weights.as_ref(), k, plan, checked, flown))
+            .collect(),
         notes: notes(scenario, designs, flights),
     }
 }
 
 /// Whether a state is measured under its own name: those are the ones whose reference is worth a line in a plot.
 fn is_output(description: &Description, state: usize) -> bool {
-    description
-        .outputs
-        .iter()
-        .any(|output| output.name == description.states[state].name)
+    description.outputs.iter().any(|output| output.name == description.states[state].name)
 }
 
 fn run<'a>(
@@ -235,11 +177,7 @@ fn run<'a>(
 ) -> RunData<'a> {
     let trajectory = &flown.flight.trajectory;
     let limits = &plan.request.limits;
-    let (states, inputs, outputs) = (
-        description.states.len(),
-        description.inputs.len(),
-        description.outputs.len(),
-    );
+    let (states, inputs, outputs) = (description.states.len(), description.inputs.len(), description.outputs.len());
     RunData {
         id: &plan.request.name,
         label: &plan.label,
@@ -249,11 +187,12 @@ fn run<'a>(
         claims: checked.claims.iter().chain(&flown.claims).collect(),
         outcome: match flown.flight.outcome {
             Outcome::Completed => OutcomeData::Completed,
-            Outcome::Diverged {
+            Outcome::EstimatorDiverged { time_s } => OutcomeData::Diverged {
                 time_s,
-                state,
-                value,
-            } => OutcomeData::Diverged {
+                state: "estimate".into(),
+                detail: "the estimate or its covariance left all bounds".into(),
+            },
+            Outcome::Diverged { time_s, state, value } => OutcomeData::Diverged {
                 time_s,
                 state: description.states[state].name.clone(),
                 detail: format!(
@@ -269,52 +208,27 @@ fn run<'a>(
         settling_time_s: flown.performance.settling_time_s,
         peak_input: flown.performance.peak_input,
         saturated_share: flown.performance.saturated_share,
-        input_limits: limits
-            .min
-            .iter()
-            .zip(&limits.max)
-            .map(|(&min, &max)| LimitData { min, max })
-            .collect(),
+        input_limits: limits.min.iter().zip(&limits.max).map(|(&min, &max)| LimitData { min, max }).collect(),
         states: series(shown, &trajectory.states, states),
         inputs: series(shown, &trajectory.inputs, inputs),
         weights: weights.map_or(Vec::new(), |weights| {
-            let parameter = description
-                .scheduling
-                .as_ref()
-                .map_or(0, |scheduling| scheduling.state);
-            let values: Vec<Vec<f64>> = trajectory
-                .states
-                .iter()
-                .map(|x| weights.at(x[parameter]))
-                .collect();
+            let parameter = description.scheduling.as_ref().map_or(0, |scheduling| scheduling.state);
+            let values: Vec<Vec<f64>> = trajectory.states.iter().map(|x| weights.at(x[parameter])).collect();
             series(shown, &values, weights.corners.len())
         }),
         cost: sampled(shown, trajectory.cost.len(), |k| trajectory.cost[k]),
-        measurement: (!trajectory.measurements.is_empty())
-            .then(|| series(shown, &trajectory.measurements, outputs)),
-        estimation: flown
-            .flight
-            .consistency
-            .as_ref()
-            .map(|consistency| EstimationData {
-                error: estimation_errors(description, shown, trajectory),
-                sigma3: (0..states)
-                    .map(|i| {
-                        sampled(shown, trajectory.deviations.len(), |k| {
-                            3.0 * trajectory.deviations[k][i]
-                        })
-                    })
-                    .collect(),
-                inside_share: consistency.inside_three_sigma.clone(),
-            }),
+        measurement: (!trajectory.measurements.is_empty()).then(|| series(shown, &trajectory.measurements, outputs)),
+        estimation: flown.flight.consistency.as_ref().map(|consistency| EstimationData {
+            error: estimation_errors(description, shown, trajectory),
+            sigma3: (0..states)
+                .map(|i| sampled(shown, trajectory.deviations.len(), |k| 3.0 * trajectory.deviations[k][i]))
+                .collect(),
+            inside_share: consistency.inside_three_sigma.clone(),
+        }),
     }
 }
 
-fn estimation_errors(
-    description: &Description,
-    shown: &[usize],
-    trajectory: &Trajectory,
-) -> Vec<Series> {
+fn estimation_errors(description: &Description, shown: &[usize], trajectory: &Trajectory) -> Vec<Series> {
     let errors: Vec<Vec<f64>> = (trajectory.estimates.iter().zip(&trajectory.states))
         .map(|(estimate, state)| {
             let mut error = vec![0.0; state.len()];
@@ -325,22 +239,30 @@ fn estimation_errors(
     series(shown, &errors, description.states.len())
 }
 
-/// What the bound of a flight is worth, in a few words.
+/// What the bound of a flight is worth, in a few words: step by step where there are several.
 pub fn bound_note(flown: &Flown) -> String {
-    if flown.steps.is_empty() {
-        return "no set-point step".into();
-    }
-    let outside: Vec<String> = (flown.steps.iter().enumerate())
-        .filter(|(_, step)| !step.is_inside())
-        .map(|(k, _)| (k + 1).to_string())
-        .collect();
-    let moves = flown.claims.last().is_some_and(|claim| {
-        claim.verdict != Verdict::Numerical && claim.claim.contains(" rests ")
-    });
-    match (outside.is_empty(), moves) {
-        (false, _) => format!("step {} outside the certified set", outside.join(", ")),
-        (true, true) => "for a parameter at rest".into(),
-        (true, false) => String::new(),
+    let worth = |bound: &StepBound| {
+        let unmet: Vec<&str> = (bound.unmet.iter())
+            .map(|condition| match condition {
+                UnmetCondition::Outside { .. } => "outside",
+                UnmetCondition::ParameterMoves { .. } => "parameter moves",
+                UnmetCondition::Noise => "noise",
+            })
+            .collect();
+        unmet.join(", ")
+    };
+    match flown.bounds.as_slice() {
+        [] => "no step".into(),
+        [one] => worth(one),
+        steps => {
+            let spell = |(k, bound): (usize, &StepBound)| match bound.verdict() {
+                Verdict::Numerical | Verdict::Proved => {
+                    format!("step {} ≤ {:.4} {}", k + 1, bound.bound, bound.verdict().word())
+                }
+                Verdict::Undecided | Verdict::Refuted => format!("step {} {}", k + 1, worth(bound)),
+            };
+            steps.iter().enumerate().map(spell).collect::<Vec<_>>().join("; ")
+        }
     }
 }
 
@@ -353,11 +275,7 @@ fn controller_line(plan: &ControllerPlan) -> String {
             format!("high-gain SLPVQR, γ = {gamma} (Theorem 5.4)")
         }
     };
-    let limits = if plan.request.limits.is_none() {
-        "; inputs not limited"
-    } else {
-        ""
-    };
+    let limits = if plan.request.limits.is_none() { "; inputs not limited" } else { "" };
     let feedback = match (plan.noise, plan.estimator) {
         (_, true) => "; noise, extended Kalman filter",
         (true, false) => "; process noise, state feedback",
@@ -372,36 +290,20 @@ fn notes(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> V
         "All bounds are of frozen-parameter designs: each holds for a parameter at rest, in floating point at the grid points. Nothing here is proved yet.".into(),
     ];
     for ((plan, checked), flown) in scenario.controllers.iter().zip(designs).zip(flights) {
-        for claim in checked
-            .claims
-            .iter()
-            .chain(&flown.claims)
-            .filter(|claim| claim.verdict < Verdict::Numerical)
-        {
-            notes.push(format!(
-                "{}: {}: {}. {}",
-                plan.label,
-                claim.verdict.word(),
-                claim.claim,
-                claim.detail
-            ));
+        for claim in checked.claims.iter().chain(&flown.claims).filter(|claim| claim.verdict < Verdict::Numerical) {
+            notes.push(format!("{}: {}: {}. {}", plan.label, claim.verdict.word(), claim.claim, claim.detail));
         }
     }
     notes
 }
 
 fn series(shown: &[usize], samples: &[Vec<f64>], width: usize) -> Vec<Series> {
-    (0..width)
-        .map(|i| sampled(shown, samples.len(), |k| samples[k][i]))
-        .collect()
+    (0..width).map(|i| sampled(shown, samples.len(), |k| samples[k][i])).collect()
 }
 
 /// The values at the shown samples; none after the end of a flight.
 fn sampled(shown: &[usize], available: usize, value: impl Fn(usize) -> f64) -> Series {
-    shown
-        .iter()
-        .map(|&k| (k < available).then(|| significant(value(k))))
-        .collect()
+    shown.iter().map(|&k| (k < available).then(|| significant(value(k)))).collect()
 }
 
 /// Six significant digits: below what a plot resolves, and a third of the file.

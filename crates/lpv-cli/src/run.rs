@@ -9,6 +9,7 @@ use crate::record::{RunRecord, trajectory_csv, trajectory_file_name};
 use crate::scenario::Scenario;
 use crate::{report, table};
 use clap::Args;
+use lpv::certificate::Verdict;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -32,32 +33,17 @@ pub struct RunArguments {
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let scenario = Scenario::read(&arguments.scenario)?;
-    let folder = ResultFolder::begin(
-        &scenario.result_folder(arguments.out.as_deref()),
-        arguments.force,
-    )?;
+    let folder = ResultFolder::begin(&scenario.result_folder(arguments.out.as_deref()), arguments.force)?;
     let checked = designs::design_all(&scenario)?;
-    let plain: Vec<_> = checked
-        .iter()
-        .map(|checked| checked.design.clone())
-        .collect();
+    let plain: Vec<_> = checked.iter().map(|checked| checked.design.clone()).collect();
     let flown = flights::fly_all(&scenario, &plain);
 
     for ((plan, checked), flown) in scenario.controllers.iter().zip(&checked).zip(&flown) {
         let name = &plan.request.name;
-        folder.write(
-            &designs::file_name(name),
-            &designs::to_json(&checked.design)?,
-        )?;
-        folder.write(
-            &trajectory_file_name(name),
-            trajectory_csv(&scenario, flown).as_bytes(),
-        )?;
+        folder.write(&designs::file_name(name), &designs::to_json(&checked.design)?)?;
+        folder.write(&trajectory_file_name(name), trajectory_csv(&scenario, flown).as_bytes())?;
     }
-    folder.write(
-        "report.html",
-        report::html(&scenario, &checked, &flown)?.as_bytes(),
-    )?;
+    folder.write("report.html", report::html(&scenario, &checked, &flown)?.as_bytes())?;
     let seconds = started.elapsed().as_secs_f64();
     let record = RunRecord::new(&scenario, &checked, &flown, seconds).to_json()?;
     folder.write("run.json", record.as_bytes())?;
@@ -75,24 +61,14 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     required_verdicts(&scenario, &checked)
 }
 
-/// The verdicts that the scenario requires.
+/// The verdicts that the scenario requires; a refuted design is never what was asked for.
 pub fn required_verdicts(scenario: &Scenario, checked: &[CheckedDesign]) -> Result<(), Failure> {
     let missed: Vec<String> = (scenario.controllers.iter().zip(checked))
         .filter_map(|(plan, checked)| {
-            let (required, reached) = (plan.require?, checked.verdict());
-            (reached < required).then(|| {
-                format!(
-                    "\"{}\" is {}, required is {}",
-                    plan.request.name,
-                    reached.word(),
-                    required.word()
-                )
-            })
+            let (required, reached) = (plan.require.unwrap_or(Verdict::Undecided), checked.verdict());
+            (reached < required)
+                .then(|| format!("\"{}\" is {}, required is {}", plan.request.name, reached.word(), required.word()))
         })
         .collect();
-    if missed.is_empty() {
-        Ok(())
-    } else {
-        Err(Failure::NotCertified(missed.join("; ")))
-    }
+    if missed.is_empty() { Ok(()) } else { Err(Failure::NotCertified(missed.join("; "))) }
 }

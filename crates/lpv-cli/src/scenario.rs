@@ -5,19 +5,18 @@ mod file;
 mod weights;
 
 use crate::failure::Failure;
+pub use file::engineers_words;
 use file::{ControllerTable, ScenarioFile};
 use lpv::controller::InputLimits;
 use lpv::estimator::NoiseCovariance;
 use lpv::math::eigen::unstabilizable_mode;
 use lpv::model::GridModel;
 use lpv::plant::{Description, Plant, PlantSpec};
-use lpv::sim::{Reference, SetPoint};
+use lpv::sim::{FARTHEST, Reference, SetPoint};
 use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// A state beyond this is called a divergence by the simulation, whatever its unit.
-const FARTHEST: f64 = 1e6;
 /// Numbers that the flights of a scenario may keep in memory: 0.8 GB.
 const MOST_NUMBERS: f64 = 1e8;
 /// Inputs that the high-gain method is meant for: it poses 2^m inequalities.
@@ -86,20 +85,13 @@ struct Door<'a> {
 
 impl Door<'_> {
     fn refuse<T>(&self, key: impl Into<String>, message: impl Into<String>) -> Result<T, Failure> {
-        Err(Failure::BadInput {
-            file: self.file.to_owned(),
-            key: key.into(),
-            message: message.into(),
-        })
+        Err(Failure::BadInput { file: self.file.to_owned(), key: key.into(), message: message.into() })
     }
 
     fn positive(&self, key: &str, value: f64) -> Result<f64, Failure> {
         match value.is_finite() && value > 0.0 {
             true => Ok(value),
-            false => self.refuse(
-                key,
-                format!("is {value}: it has to be a positive, finite number"),
-            ),
+            false => self.refuse(key, format!("is {value}: it has to be a positive, finite number")),
         }
     }
 
@@ -118,7 +110,7 @@ impl Scenario {
         let door = Door { file: path };
         let file: ScenarioFile = toml::from_str(&text).map_err(|error| Failure::Unreadable {
             file: path.to_owned(),
-            message: error.to_string().trim_end().into(),
+            message: file::toml_message(&text, &error),
         })?;
 
         file_name_part(&door, "name", &file.name)?;
@@ -141,8 +133,7 @@ impl Scenario {
         let duration_s = door.positive("simulation.duration_s", simulation.duration_s)?;
         let sample_time_s = door.positive("simulation.sample_time_s", simulation.sample_time_s)?;
         if sample_time_s > duration_s {
-            let message =
-                format!("is {duration_s}: it cannot be less than sample_time_s = {sample_time_s}");
+            let message = format!("is {duration_s}: it cannot be less than sample_time_s = {sample_time_s}");
             return door.refuse("simulation.duration_s", message);
         }
         let samples = (duration_s / sample_time_s).round();
@@ -155,9 +146,7 @@ impl Scenario {
             Some(interval) if interval < sample_time_s => {
                 return door.refuse(
                     "simulation.record_interval_s",
-                    format!(
-                        "is {interval}: it cannot be less than sample_time_s = {sample_time_s}"
-                    ),
+                    format!("is {interval}: it cannot be less than sample_time_s = {sample_time_s}"),
                 );
             }
             Some(interval) => door.finite("simulation.record_interval_s", interval)?,
@@ -166,13 +155,8 @@ impl Scenario {
         let trim = plant.trim(0.0);
         let mut initial_state = trim.state.clone();
         for (key, value) in &simulation.initial_state {
-            let (state, value) = state_value(
-                &door,
-                &format!("simulation.initial_state.{key}"),
-                description,
-                key,
-                value,
-            )?;
+            let (state, value) =
+                state_value(&door, &format!("simulation.initial_state.{key}"), description, key, value)?;
             initial_state[state] = value;
             if simulation.initial_state.contains_key(&format!("{key}_deg")) {
                 return door.refuse(
@@ -183,26 +167,11 @@ impl Scenario {
         }
         let mut set_points = Vec::new();
         for (k, table) in file.set_point.iter().enumerate() {
-            set_points.push(set_point(
-                &door,
-                &format!("set_point[{}]", k + 1),
-                description,
-                table,
-                last_sample_s,
-            )?);
+            set_points.push(set_point(&door, &format!("set_point[{}]", k + 1), description, table, last_sample_s)?);
         }
         set_points.sort_by(|a: &(SetPoint, String), b| a.0.time_s.total_cmp(&b.0.time_s));
-        if let Some(pair) = set_points
-            .windows(2)
-            .find(|pair| pair[0].0.time_s == pair[1].0.time_s)
-        {
-            return door.refuse(
-                "set_point",
-                format!(
-                    "two set points have time_s = {}; join them",
-                    pair[0].0.time_s
-                ),
-            );
+        if let Some(pair) = set_points.windows(2).find(|pair| pair[0].0.time_s == pair[1].0.time_s) {
+            return door.refuse("set_point", format!("two set points have time_s = {}; join them", pair[0].0.time_s));
         }
         let (set_points, set_point_labels) = set_points.into_iter().unzip();
         let reference = Reference::new(initial_state.clone(), set_points);
@@ -237,20 +206,14 @@ impl Scenario {
         };
         let mut controllers: Vec<ControllerPlan> = Vec::new();
         if file.controller.is_empty() {
-            return door.refuse(
-                "controller",
-                "there is none; add at least one [[controller]] table",
-            );
+            return door.refuse("controller", "there is none; add at least one [[controller]] table");
         }
         for (k, table) in file.controller.into_iter().enumerate() {
             let key = format!("controller[{}]", k + 1);
             let plan = controller(&door, &key, table, &defaults, noise.is_some())?;
             let name = &plan.request.name;
             // some file systems do not tell "A" from "a"
-            if controllers
-                .iter()
-                .any(|other| other.request.name.eq_ignore_ascii_case(name))
-            {
+            if controllers.iter().any(|other| other.request.name.eq_ignore_ascii_case(name)) {
                 return door.refuse(
                     format!("{key}.name"),
                     format!("\"{name}\" is already taken; names have to differ, and not in upper and lower case only"),
@@ -311,11 +274,7 @@ impl Scenario {
 fn numbers_per_sample(description: &Description, controllers: &[ControllerPlan]) -> f64 {
     let (n, m) = (description.states.len(), description.inputs.len());
     let of_one = |plan: &ControllerPlan| {
-        let measured = if plan.noise {
-            description.outputs.len()
-        } else {
-            0
-        };
+        let measured = if plan.noise { description.outputs.len() } else { 0 };
         let estimated = if plan.estimator { 2 * n } else { 0 };
         // states, references, inputs; time, cost and the flag of saturation
         2 * n + m + 3 + measured + estimated
@@ -325,25 +284,16 @@ fn numbers_per_sample(description: &Description, controllers: &[ControllerPlan])
 
 /// The text of a file; a file that is not there, too large or not UTF-8 is bad input.
 pub fn read_text(path: &Path) -> Result<String, Failure> {
-    let unreadable = |message: String| Failure::Unreadable {
-        file: path.to_owned(),
-        message,
-    };
+    let unreadable = |message: String| Failure::Unreadable { file: path.to_owned(), message };
     let mut bytes = Vec::new();
     std::fs::File::open(path)
         .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
         .map_err(|error| unreadable(format!("cannot be read: {error}")))?;
     if bytes.len() as u64 > LARGEST_FILE {
-        return Err(unreadable(format!(
-            "is too large: allowed are {} MiB",
-            LARGEST_FILE >> 20
-        )));
+        return Err(unreadable(format!("is too large: allowed are {} MiB", LARGEST_FILE >> 20)));
     }
     String::from_utf8(bytes).map_err(|error| {
-        unreadable(format!(
-            "is not a text file: byte {} is not UTF-8",
-            error.utf8_error().valid_up_to() + 1
-        ))
+        unreadable(format!("is not a text file: byte {} is not UTF-8", error.utf8_error().valid_up_to() + 1))
     })
 }
 
@@ -361,10 +311,9 @@ fn file_name_part(door: &Door, key: &str, name: &str) -> Result<(), Failure> {
 
 fn grid_points(door: &Door, count: usize, plant: &dyn Plant) -> Result<usize, Failure> {
     match plant.description().scheduling {
-        Some(_) if !(4..=4096).contains(&count) => door.refuse(
-            "model.grid_points",
-            format!("is {count}: allowed are 4 to 4096"),
-        ),
+        Some(_) if !(4..=4096).contains(&count) => {
+            door.refuse("model.grid_points", format!("is {count}: allowed are 4 to 4096"))
+        }
         _ => Ok(count),
     }
 }
@@ -372,9 +321,8 @@ fn grid_points(door: &Door, count: usize, plant: &dyn Plant) -> Result<usize, Fa
 fn stabilizable(door: &Door, model: &GridModel) -> Result<(), Failure> {
     for point in &model.points {
         if let Some((re, im)) = unstabilizable_mode(&point.a, &point.b) {
-            let parameter = model.scheduling.as_ref().map_or(String::new(), |s| {
-                format!(" at {} = {:.4}", s.parameter, point.rho)
-            });
+            let parameter =
+                model.scheduling.as_ref().map_or(String::new(), |s| format!(" at {} = {:.4}", s.parameter, point.rho));
             let message = format!(
                 "the pair (A, B) is not stabilisable{parameter}: no input moves the mode {re:.4} {im:+.4}i, which does not decay by itself"
             );
@@ -396,16 +344,11 @@ fn state_value(
         toml::Value::Float(value) => *value,
         toml::Value::Integer(value) => *value as f64,
         other => {
-            return door.refuse(
-                key,
-                format!("is a {}: it has to be a number", other.type_str()),
-            );
+            return door.refuse(key, format!("is of type {}: it has to be a number", other.type_str()));
         }
     };
     let number = door.finite(key, number)?;
-    let in_degrees = name
-        .strip_suffix("_deg")
-        .and_then(|name| description.state(name));
+    let in_degrees = name.strip_suffix("_deg").and_then(|name| description.state(name));
     let in_range = |state: usize, value: f64| {
         let limit = description.state_limits[state].map_or(FARTHEST, |limit| limit.min(FARTHEST));
         match value.abs() < limit {
@@ -413,7 +356,8 @@ fn state_value(
             false => door.refuse(
                 key,
                 format!(
-                    "is {value:.6e} {unit}: allowed are values between -{limit:.6} and {limit:.6} {unit}",
+                    "is {value:e} {unit}: allowed are values between -{limit} and {limit} {unit}",
+                    limit = (limit * 1e6).round() / 1e6,
                     unit = description.states[state].unit
                 ),
             ),
@@ -421,9 +365,7 @@ fn state_value(
     };
     match (description.state(name), in_degrees) {
         (Some(state), _) => in_range(state, number),
-        (None, Some(state)) if description.states[state].unit == "rad" => {
-            in_range(state, number.to_radians())
-        }
+        (None, Some(state)) if description.states[state].unit == "rad" => in_range(state, number.to_radians()),
         _ => {
             let names: Vec<String> = (description.states.iter())
                 .map(|signal| match signal.unit.as_str() {
@@ -431,13 +373,7 @@ fn state_value(
                     _ => signal.name.clone(),
                 })
                 .collect();
-            door.refuse(
-                key,
-                format!(
-                    "is not a state of the plant; allowed are {}",
-                    names.join(", ")
-                ),
-            )
+            door.refuse(key, format!("is not a state of the plant; allowed are {}", names.join(", ")))
         }
     }
 }
@@ -457,24 +393,14 @@ fn set_point(
             ("time_s", toml::Value::Integer(time)) => time_s = Some(*time as f64),
             ("label", toml::Value::String(text)) => label = Some(text.clone()),
             ("time_s" | "label", other) => {
-                let expected = if name == "label" {
-                    "a string"
-                } else {
-                    "a number of seconds"
-                };
-                return door.refuse(
-                    key,
-                    format!("is a {}: it has to be {expected}", other.type_str()),
-                );
+                let expected = if name == "label" { "a string" } else { "a number of seconds" };
+                return door.refuse(key, format!("is of type {}: it has to be {expected}", other.type_str()));
             }
             _ => targets.push(state_value(door, &key, description, name, value)?),
         }
     }
     let Some(time_s) = time_s else {
-        return door.refuse(
-            format!("{key}.time_s"),
-            "is missing: say when the set point takes effect, in seconds",
-        );
+        return door.refuse(format!("{key}.time_s"), "is missing: say when the set point takes effect, in seconds");
     };
     if !(0.0..last_sample_s).contains(&time_s) {
         return door.refuse(
@@ -484,28 +410,15 @@ fn set_point(
     }
     if targets.is_empty() {
         let example = &description.states[0].name;
-        return door.refuse(
-            key,
-            format!("moves no state; give at least one, such as {example} = 1.0"),
-        );
+        return door.refuse(key, format!("moves no state; give at least one, such as {example} = 1.0"));
     }
-    if let Some(name) = table
-        .keys()
-        .find(|name| table.contains_key(&format!("{name}_deg")))
-    {
-        return door.refuse(
-            format!("{key}.{name}"),
-            format!("{name} and {name}_deg are both given; keep one"),
-        );
+    if let Some(name) = table.keys().find(|name| table.contains_key(&format!("{name}_deg"))) {
+        return door.refuse(format!("{key}.{name}"), format!("{name} and {name}_deg are both given; keep one"));
     }
     let spell = |&(state, value): &(usize, f64)| {
         let signal = &description.states[state];
         match signal.unit.as_str() {
-            "rad" => format!(
-                "{} = {}°",
-                signal.name,
-                (value.to_degrees() * 1e6).round() / 1e6
-            ),
+            "rad" => format!("{} = {}°", signal.name, (value.to_degrees() * 1e6).round() / 1e6),
             unit => format!("{} = {value} {unit}", signal.name),
         }
     };
@@ -532,10 +445,7 @@ fn controller(
 ) -> Result<ControllerPlan, Failure> {
     file_name_part(door, &format!("{key}.name"), &table.name)?;
     if table.unlimited && table.limits.is_some() {
-        return door.refuse(
-            format!("{key}.unlimited"),
-            "contradicts the limits of this controller; keep one",
-        );
+        return door.refuse(format!("{key}.unlimited"), "contradicts the limits of this controller; keep one");
     }
     let label = table.label.unwrap_or_else(|| table.name.clone());
     if label.chars().any(char::is_control) {
@@ -547,11 +457,7 @@ fn controller(
     let limits = match (table.unlimited, table.limits.as_ref().or(defaults.limits)) {
         (true, _) | (false, None) => InputLimits::none(defaults.operating_input.len()),
         (false, Some(limits)) => {
-            let place = if table.limits.is_some() {
-                format!("{key}.limits")
-            } else {
-                "limits".into()
-            };
+            let place = if table.limits.is_some() { format!("{key}.limits") } else { "limits".into() };
             input_limits(door, &place, limits, defaults)?
         }
     };
@@ -562,7 +468,10 @@ fn controller(
     let method = match (table.method, gamma) {
         (file::MethodName::Lpvqr, None) => Method::Lpvqr,
         (file::MethodName::Lpvqr, Some(_)) => {
-            return door.refuse(format!("{key}.gamma"), "method \"lpvqr\" knows no γ; remove it, or choose \"slpvqr\" or \"high-gain-slpvqr\"");
+            return door.refuse(
+                format!("{key}.gamma"),
+                "method \"lpvqr\" knows no γ; remove it, or choose \"slpvqr\" or \"high-gain-slpvqr\"",
+            );
         }
         (_, None) => {
             return door.refuse(
@@ -578,10 +487,7 @@ fn controller(
         }
     };
     if table.high_gain.is_some() && !matches!(method, Method::HighGainSlpvqr { .. }) {
-        return door.refuse(
-            format!("{key}.high_gain"),
-            "belongs to method \"high-gain-slpvqr\" only",
-        );
+        return door.refuse(format!("{key}.high_gain"), "belongs to method \"high-gain-slpvqr\" only");
     }
     if let Some(gamma) = method.gamma() {
         let Some(sigma) = limits.symmetric_bound(defaults.operating_input) else {
@@ -590,15 +496,10 @@ fn controller(
                 "a saturated method needs a limit on every input; give [limits] min and max",
             );
         };
-        if !sigma
-            .iter()
-            .all(|sigma| (sigma * sigma / gamma).is_normal())
-        {
+        if !sigma.iter().all(|sigma| (sigma * sigma / gamma).is_normal()) {
             return door.refuse(
                 format!("{key}.gamma"),
-                format!(
-                    "is {gamma:e}: limit²/γ is too large or too small a number to calculate with"
-                ),
+                format!("is {gamma:e}: limit²/γ is too large or too small a number to calculate with"),
             );
         }
     }
@@ -610,16 +511,10 @@ fn controller(
         );
     }
     if (table.noise || table.estimator.is_some()) && !has_noise {
-        return door.refuse(
-            format!("{key}.noise"),
-            "the scenario has no [noise] table to take covariances from",
-        );
+        return door.refuse(format!("{key}.noise"), "the scenario has no [noise] table to take covariances from");
     }
     if table.estimator.is_some() && !table.noise {
-        return door.refuse(
-            format!("{key}.estimator"),
-            "an estimator needs measurements: set noise = true",
-        );
+        return door.refuse(format!("{key}.estimator"), "an estimator needs measurements: set noise = true");
     }
     Ok(ControllerPlan {
         label,
@@ -642,19 +537,13 @@ fn check_high_gain(door: &Door, key: &str, options: &HighGainOptions) -> Result<
     if !(options.recovery >= 0.0 && options.recovery.is_finite()) {
         return door.refuse(
             format!("{key}.recovery"),
-            format!(
-                "is {}: it has to be a fraction, zero or more",
-                options.recovery
-            ),
+            format!("is {}: it has to be a fraction, zero or more", options.recovery),
         );
     }
     if !(options.gain_margin >= 1.0 && options.gain_margin.is_finite()) {
         return door.refuse(
             format!("{key}.gain_margin"),
-            format!(
-                "is {}: it has to be a factor of at least 1",
-                options.gain_margin
-            ),
+            format!("is {}: it has to be a factor of at least 1", options.gain_margin),
         );
     }
     Ok(())
@@ -669,11 +558,7 @@ fn input_limits(
     let m = defaults.operating_input.len();
     // a limit of -∞ below or ∞ above is none
     let limit = |side: &str, value: f64| {
-        let none = if side == "min" {
-            f64::NEG_INFINITY
-        } else {
-            f64::INFINITY
-        };
+        let none = if side == "min" { f64::NEG_INFINITY } else { f64::INFINITY };
         Some(value).filter(|&value| value != none)
     };
     let spread = |side: &str, bound: &Option<file::Bound>| match bound {
@@ -682,21 +567,12 @@ fn input_limits(
         Some(file::Bound::Each(values)) if values.len() == m => {
             Ok(values.iter().map(|&value| limit(side, value)).collect())
         }
-        Some(file::Bound::Each(values)) => door.refuse(
-            format!("{key}.{side}"),
-            format!("has {} numbers: the plant has {m} inputs", values.len()),
-        ),
+        Some(file::Bound::Each(values)) => {
+            door.refuse(format!("{key}.{side}"), format!("has {} numbers: the plant has {m} inputs", values.len()))
+        }
     };
-    let limits = InputLimits {
-        min: spread("min", &table.min)?,
-        max: spread("max", &table.max)?,
-    };
-    for (i, (&operating, signal)) in defaults
-        .operating_input
-        .iter()
-        .zip(&defaults.description.inputs)
-        .enumerate()
-    {
+    let limits = InputLimits { min: spread("min", &table.min)?, max: spread("max", &table.max)? };
+    for (i, (&operating, signal)) in defaults.operating_input.iter().zip(&defaults.description.inputs).enumerate() {
         let outside = |side: &str, bound: f64| {
             door.refuse(
                 format!("{key}.{side}"),

@@ -50,11 +50,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
     let source = arguments.designs.clone().unwrap_or_else(|| {
         let designed = scenario.designs_folder();
-        if designed.exists() {
-            designed
-        } else {
-            scenario.result_folder(None)
-        }
+        if designed.exists() { designed } else { scenario.result_folder(None) }
     });
     let mut loaded = Vec::new();
     for plan in &scenario.controllers {
@@ -63,71 +59,43 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         let request = &plan.request;
         let same = [
             ("plant", design.plant == scenario.plant_spec),
-            (
-                "sample_time_s",
-                design.sample_time_s == scenario.sample_time_s,
-            ),
+            ("sample_time_s", design.sample_time_s == scenario.sample_time_s),
             ("method", design.method == request.method),
             ("weights.q", design.weights.q == request.weights.q),
             ("weights.r", design.weights.r == request.weights.r),
-            (
-                "controller.limits",
-                design.controller.limits == request.limits,
-            ),
+            ("controller.limits", design.controller.limits == request.limits),
         ];
         if let Some((key, _)) = same.into_iter().find(|(_, same)| !same) {
             return Err(Failure::BadInput {
                 file,
                 key: key.into(),
-                message: format!(
-                    "differs from {}; design again",
-                    arguments.scenario.display()
-                ),
+                message: format!("differs from {}; design again", arguments.scenario.display()),
             });
         }
         loaded.push(design);
     }
-    let place = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| scenario.flights_folder());
+    let place = arguments.out.clone().unwrap_or_else(|| scenario.flights_folder());
     let folder = ResultFolder::begin(&place, arguments.force)?;
     let flown = flights::fly_all(&scenario, &loaded);
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {
-        folder.write(
-            &trajectory_file_name(&plan.request.name),
-            trajectory_csv(&scenario, flown).as_bytes(),
-        )?;
+        folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
     }
     let place = folder.finish()?;
     if arguments.json {
-        let summaries: Vec<FlightSummary> = scenario
-            .controllers
-            .iter()
-            .zip(&flown)
-            .map(|(plan, flown)| summary(&plan.request.name, flown))
-            .collect();
-        let json = serde_json::to_string_pretty(&summaries)
-            .map_err(|error| Failure::serialisation(&error))?;
+        let summaries: Vec<FlightSummary> =
+            scenario.controllers.iter().zip(&flown).map(|(plan, flown)| summary(&plan.request.name, flown)).collect();
+        let json = serde_json::to_string_pretty(&summaries).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;
     } else {
         for (plan, flown) in scenario.controllers.iter().zip(&flown) {
-            let cost = flown
-                .performance
-                .actual_cost
-                .map_or("-".into(), |cost| format!("{cost:.4}"));
-            let settling = flown
-                .performance
-                .settling_time_s
-                .map_or("-".into(), |time| format!("{time:.2} s"));
+            let cost = flown.performance.actual_cost.map_or("-".into(), |cost| format!("{cost:.4}"));
+            let settling = flown.performance.settling_time_s.map_or("-".into(), |time| format!("{time:.2} s"));
             let ending = match flown.flight.outcome {
                 Outcome::Completed => "completed".into(),
                 Outcome::Diverged { time_s, .. } => format!("diverged at {time_s:.2} s"),
+                Outcome::EstimatorDiverged { time_s } => format!("the estimator diverged at {time_s:.2} s"),
             };
-            print(&format!(
-                "{}: {ending}, cost {cost}, settling {settling}",
-                plan.label
-            ))?;
+            print(&format!("{}: {ending}, cost {cost}, settling {settling}", plan.label))?;
         }
         print(&place.display().to_string())?;
     }

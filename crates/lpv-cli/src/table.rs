@@ -21,40 +21,32 @@ const HEADER: [&str; 8] = [
 /// All controllers side by side.
 pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> String {
     let description = scenario.plant.description();
-    let unit = description
-        .inputs
-        .first()
-        .map_or("", |signal| signal.unit.as_str());
+    let unit = description.inputs.first().map_or("", |signal| signal.unit.as_str());
     let mut rows = vec![HEADER.map(str::to_owned).to_vec()];
     for ((plan, checked), flown) in scenario.controllers.iter().zip(designs).zip(flights) {
         let performance = &flown.performance;
-        let number = |value: Option<f64>, digits: usize| {
-            value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
-        };
+        let number =
+            |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
         let note = bound_note(flown);
         let verdict = bound_verdict(checked, flown).word();
         let bound = match (flown.guaranteed_cost(), note.is_empty()) {
             (Some(bound), true) => format!("{bound:.4} ({verdict})"),
             (Some(bound), false) => format!("{bound:.4} ({verdict}: {note})"),
-            (None, _) => format!("none ({note})"),
+            (None, _) => note,
         };
         rows.push(vec![
             plan.label.clone(),
             checked.verdict().word().to_owned(),
             bound,
             number(performance.actual_cost, 4),
-            performance
-                .settling_time_s
-                .map_or("-".into(), |time| format!("{time:.2} s")),
+            performance.settling_time_s.map_or("-".into(), |time| format!("{time:.2} s")),
             format!("{:.2} {unit}", performance.peak_input),
             format!("{:.1} %", 100.0 * performance.saturated_share),
             match flown.flight.outcome {
                 Outcome::Completed => "completed".to_owned(),
+                Outcome::EstimatorDiverged { time_s } => format!("DIVERGED at {time_s:.2} s (estimate)"),
                 Outcome::Diverged { time_s, state, .. } => {
-                    format!(
-                        "DIVERGED at {time_s:.2} s ({})",
-                        description.states[state].name
-                    )
+                    format!("DIVERGED at {time_s:.2} s ({})", description.states[state].name)
                 }
             },
         ]);
@@ -65,23 +57,14 @@ pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flo
 /// Rows with columns aligned: the first three and the last to the left, numbers to the right.
 fn format_rows(rows: &[Vec<String>]) -> String {
     let columns = rows[0].len();
-    let width = |j: usize| {
-        rows.iter()
-            .map(|row| row[j].chars().count())
-            .max()
-            .unwrap_or(0)
-    };
+    let width = |j: usize| rows.iter().map(|row| row[j].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
     for (i, row) in rows.iter().enumerate() {
         let cells: Vec<String> = (row.iter().enumerate())
             .map(|(j, cell)| {
                 let padding = " ".repeat(widths[j] - cell.chars().count());
-                if (3..columns - 1).contains(&j) {
-                    padding + cell
-                } else {
-                    cell.clone() + &padding
-                }
+                if (3..columns - 1).contains(&j) { padding + cell } else { cell.clone() + &padding }
             })
             .collect();
         text.push_str(cells.join("  ").trim_end());

@@ -26,11 +26,7 @@ impl Iteration<'_> {
         }
         let far = -status.objective;
         // F(x) − F(0) = S + R − C, and S is positive definite.
-        let defect = self
-            .blocks
-            .iter()
-            .zip(&self.constant_norms)
-            .map(|(b, c)| (norm(&b.residual) + c) / far);
+        let defect = self.blocks.iter().zip(&self.constant_norms).map(|(b, c)| (norm(&b.residual) + c) / far);
         (defect.fold(0.0, nan_max) <= CERTIFICATE).then(|| self.x.iter().map(|x| x / far).collect())
     }
 
@@ -50,20 +46,9 @@ impl Iteration<'_> {
             state.propose_dual(block, &self.change);
             definite = definite && state.try_dual(1.0, &mut self.scratch);
         }
-        let objective =
-            |state: &BlockState, c: &[f64], step: f64| -dot(c, &state.z) - step * dot(c, &state.dz);
-        let total: f64 = self
-            .blocks
-            .iter()
-            .zip(self.operators)
-            .map(|(s, b)| objective(s, b.constant(), 1.0))
-            .sum();
-        let before: f64 = self
-            .blocks
-            .iter()
-            .zip(self.operators)
-            .map(|(s, b)| objective(s, b.constant(), 0.0))
-            .sum();
+        let objective = |state: &BlockState, c: &[f64], step: f64| -dot(c, &state.z) - step * dot(c, &state.dz);
+        let total: f64 = self.blocks.iter().zip(self.operators).map(|(s, b)| objective(s, b.constant(), 1.0)).sum();
+        let before: f64 = self.blocks.iter().zip(self.operators).map(|(s, b)| objective(s, b.constant(), 0.0)).sum();
         let done = definite && total > 0.5 * before;
         for state in &mut self.blocks {
             if done {
@@ -103,15 +88,9 @@ impl Iteration<'_> {
             let mut gram = Schur::new(unknowns);
             for (state, block) in self.blocks.iter_mut().zip(self.operators) {
                 let identity = state.identity();
-                block.schur(
-                    &identity,
-                    &identity,
-                    &mut gram.matrix,
-                    unknowns,
-                    &mut state.operator,
-                );
+                block.schur(&identity, &identity, &mut gram.matrix, unknowns, &mut state.operator);
             }
-            if !gram.factorize() {
+            if !gram.factorize(0.0) {
                 return None;
             }
             self.gram = Some(gram);

@@ -48,9 +48,7 @@ pub enum ReadError {
         most: i64,
     },
     /// A diagonal block has an entry off its diagonal.
-    #[error(
-        "line {line}: entry ({row}, {column}) lies off the diagonal of block {block}, which is diagonal"
-    )]
+    #[error("line {line}: entry ({row}, {column}) lies off the diagonal of block {block}, which is diagonal")]
     OffDiagonal {
         /// Line, counted from 1.
         line: usize,
@@ -72,11 +70,7 @@ const MOST: i64 = 1_000_000;
 ///
 /// [`ReadError`] with the line where the file departs from the format.
 pub fn read(input: impl BufRead) -> Result<Sdp, ReadError> {
-    let mut numbers = Numbers {
-        input,
-        line: 0,
-        tokens: VecDeque::new(),
-    };
+    let mut numbers = Numbers { input, line: 0, tokens: VecDeque::new() };
     let m = numbers.leading_count("the number of unknowns")?;
     let count = numbers.leading_count("the number of blocks")?;
     let mut blocks = Vec::new();
@@ -114,12 +108,7 @@ pub fn read(input: impl BufRead) -> Result<Sdp, ReadError> {
             if value == 0.0 {
                 continue;
             }
-            return Err(ReadError::OffDiagonal {
-                line: numbers.line,
-                block,
-                row,
-                column,
-            });
+            return Err(ReadError::OffDiagonal { line: numbers.line, block, row, column });
         }
         coefficients.push(Coefficient {
             unknown: matrix.checked_sub(1),
@@ -129,11 +118,7 @@ pub fn read(input: impl BufRead) -> Result<Sdp, ReadError> {
             value,
         });
     }
-    Ok(Sdp {
-        objective,
-        blocks,
-        coefficients,
-    })
+    Ok(Sdp { objective, blocks, coefficients })
 }
 
 /// The numbers of a file, one line in memory at a time.
@@ -150,10 +135,7 @@ impl<R: BufRead> Numbers<R> {
         while self.tokens.is_empty() {
             bytes.clear();
             let read = self.input.read_until(b'\n', &mut bytes);
-            let read = read.map_err(|source| ReadError::Io {
-                line: self.line + 1,
-                source,
-            })?;
+            let read = read.map_err(|source| ReadError::Io { line: self.line + 1, source })?;
             if read == 0 {
                 return Ok(false);
             }
@@ -164,21 +146,14 @@ impl<R: BufRead> Numbers<R> {
                 continue;
             }
             let separators = |c: char| c.is_whitespace() || ",(){}".contains(c);
-            self.tokens.extend(
-                text.split(separators)
-                    .filter(|token| !token.is_empty())
-                    .map(str::to_owned),
-            );
+            self.tokens.extend(text.split(separators).filter(|token| !token.is_empty()).map(str::to_owned));
         }
         Ok(true)
     }
 
     fn next(&mut self, expected: &'static str) -> Result<String, ReadError> {
         self.fill()?;
-        self.tokens.pop_front().ok_or(ReadError::UnexpectedEnd {
-            line: self.line,
-            expected,
-        })
+        self.tokens.pop_front().ok_or(ReadError::UnexpectedEnd { line: self.line, expected })
     }
 
     /// A count at the start of a line; what follows on the line is a remark.
@@ -186,9 +161,7 @@ impl<R: BufRead> Numbers<R> {
         self.fill()?;
         if let Some(first) = self.tokens.front_mut() {
             // Some files glue the remark to the number, as in "13=mDIM".
-            let digits = first
-                .find(|c: char| !(c.is_ascii_digit() || c == '+' || c == '-'))
-                .unwrap_or(first.len());
+            let digits = first.find(|c: char| !(c.is_ascii_digit() || c == '+' || c == '-')).unwrap_or(first.len());
             if digits > 0 {
                 first.truncate(digits);
             }
@@ -205,19 +178,9 @@ impl<R: BufRead> Numbers<R> {
             let value = token.parse::<f64>().ok()?;
             (value.fract() == 0.0 && value.abs() < 1e15).then_some(value as i64)
         });
-        let found = parsed.ok_or(ReadError::NotANumber {
-            line: self.line,
-            found: token,
-            expected: what,
-        })?;
+        let found = parsed.ok_or(ReadError::NotANumber { line: self.line, found: token, expected: what })?;
         if found < least || found > most {
-            return Err(ReadError::OutOfRange {
-                line: self.line,
-                what,
-                found,
-                least,
-                most,
-            });
+            return Err(ReadError::OutOfRange { line: self.line, what, found, least, most });
         }
         Ok(found)
     }
@@ -225,16 +188,10 @@ impl<R: BufRead> Numbers<R> {
     fn real(&mut self, what: &'static str) -> Result<f64, ReadError> {
         let token = self.next(what)?;
         // Fortran writes exponents with D.
-        let parsed = token
-            .parse::<f64>()
-            .or_else(|_| token.replace(['D', 'd'], "e").parse::<f64>());
+        let parsed = token.parse::<f64>().or_else(|_| token.replace(['D', 'd'], "e").parse::<f64>());
         match parsed {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(ReadError::NotANumber {
-                line: self.line,
-                found: token,
-                expected: what,
-            }),
+            _ => Err(ReadError::NotANumber { line: self.line, found: token, expected: what }),
         }
     }
 }

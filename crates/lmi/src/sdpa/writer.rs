@@ -19,24 +19,10 @@ pub fn write(problem: &Sdp, mut output: impl Write) -> io::Result<()> {
     let objective = problem.objective.iter().map(|c| format!("{c:e}"));
     writeln!(output, "{}", objective.collect::<Vec<_>>().join(" "))?;
     let mut coefficients: Vec<_> = problem.coefficients.iter().collect();
-    coefficients.sort_by_key(|c| {
-        (
-            c.unknown.map_or(0, |unknown| unknown + 1),
-            c.block,
-            c.row,
-            c.column,
-        )
-    });
+    coefficients.sort_by_key(|c| (c.unknown.map_or(0, |unknown| unknown + 1), c.block, c.row, c.column));
     for c in coefficients {
         let matrix = c.unknown.map_or(0, |unknown| unknown + 1);
-        writeln!(
-            output,
-            "{matrix} {} {} {} {:e}",
-            c.block + 1,
-            c.row + 1,
-            c.column + 1,
-            c.value
-        )?;
+        writeln!(output, "{matrix} {} {} {} {:e}", c.block + 1, c.row + 1, c.column + 1, c.value)?;
     }
     Ok(())
 }

@@ -6,26 +6,11 @@ use proptest::prelude::*;
 use std::time::Duration;
 
 fn options() -> Options {
-    Options {
-        time_limit: Some(Duration::from_secs(20)),
-        ..Options::default()
-    }
+    Options { time_limit: Some(Duration::from_secs(20)), ..Options::default() }
 }
 
-fn entry(
-    unknown: Option<usize>,
-    block: usize,
-    row: usize,
-    column: usize,
-    value: f64,
-) -> Coefficient {
-    Coefficient {
-        unknown,
-        block,
-        row,
-        column,
-        value,
-    }
+fn entry(unknown: Option<usize>, block: usize, row: usize, column: usize, value: f64) -> Coefficient {
+    Coefficient { unknown, block, row, column, value }
 }
 
 /// What holds of every answer.
@@ -42,17 +27,9 @@ fn one_by_one() {
     // minimise x with x − 2 ⪰ 0.
     let coefficients = vec![entry(None, 0, 0, 0, 2.0), entry(Some(0), 0, 0, 0, 1.0)];
     for shape in [BlockShape::Symmetric(1), BlockShape::Diagonal(1)] {
-        let problem = Sdp {
-            objective: vec![1.0],
-            blocks: vec![shape],
-            coefficients: coefficients.clone(),
-        };
+        let problem = Sdp { objective: vec![1.0], blocks: vec![shape], coefficients: coefficients.clone() };
         let answer = problem.solve(&options()).unwrap();
-        assert!(
-            matches!(answer.outcome, Outcome::Solved),
-            "{:?}",
-            answer.outcome
-        );
+        assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
         assert!((answer.objective - 2.0).abs() < 1e-7);
     }
 }
@@ -72,12 +49,7 @@ fn zero_blocks_and_zero_matrices() {
     };
     let answer = problem.solve(&options()).unwrap();
     sane(&answer);
-    assert!(
-        (answer.objective - 1.0).abs() < 1e-4,
-        "{} {:?}",
-        answer.objective,
-        answer.outcome
-    );
+    assert!((answer.objective - 1.0).abs() < 1e-4, "{} {:?}", answer.objective, answer.outcome);
 }
 
 #[test]
@@ -94,73 +66,28 @@ fn repeated_entries_add_up() {
         ],
     };
     let answer = problem.solve(&options()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
     assert!((answer.objective - 3.0).abs() < 1e-6);
 }
 
 #[test]
 fn no_block_or_a_place_that_does_not_exist() {
     let solve = |blocks: Vec<BlockShape>, c: Coefficient| {
-        Sdp {
-            objective: vec![1.0],
-            blocks,
-            coefficients: vec![c],
-        }
-        .solve(&options())
+        Sdp { objective: vec![1.0], blocks, coefficients: vec![c] }.solve(&options())
     };
     let square = vec![BlockShape::Symmetric(2)];
-    assert!(matches!(
-        solve(vec![], entry(None, 0, 0, 0, 1.0)),
-        Err(Error::NoConstraint)
-    ));
-    for c in [
-        entry(None, 1, 0, 0, 1.0),
-        entry(Some(1), 0, 0, 0, 1.0),
-        entry(None, 0, 0, 2, 1.0),
-    ] {
-        assert!(matches!(
-            solve(square.clone(), c),
-            Err(Error::BadCoefficient { .. })
-        ));
+    assert!(matches!(solve(vec![], entry(None, 0, 0, 0, 1.0)), Err(Error::NoConstraint)));
+    for c in [entry(None, 1, 0, 0, 1.0), entry(Some(1), 0, 0, 0, 1.0), entry(None, 0, 0, 2, 1.0)] {
+        assert!(matches!(solve(square.clone(), c), Err(Error::BadCoefficient { .. })));
     }
     let diagonal = vec![BlockShape::Diagonal(2)];
-    assert!(matches!(
-        solve(diagonal, entry(None, 0, 0, 1, 1.0)),
-        Err(Error::BadCoefficient { .. })
-    ));
-    assert!(matches!(
-        solve(square.clone(), entry(None, 0, 0, 0, f64::NAN)),
-        Err(Error::NotFinite { .. })
-    ));
-    assert!(matches!(
-        solve(square, entry(Some(0), 0, 0, 0, f64::INFINITY)),
-        Err(Error::NotFinite { .. })
-    ));
-    let objective = Sdp {
-        objective: vec![f64::NAN],
-        blocks: vec![BlockShape::Diagonal(1)],
-        coefficients: vec![],
-    };
-    assert!(matches!(
-        objective.solve(&options()),
-        Err(Error::NotFinite { .. })
-    ));
-    let large = Sdp {
-        objective: vec![0.0; 30_000],
-        blocks: vec![BlockShape::Diagonal(1)],
-        coefficients: vec![],
-    };
-    assert!(matches!(
-        large.solve(&options()),
-        Err(Error::TooLarge {
-            unknowns: 30_000,
-            ..
-        })
-    ));
+    assert!(matches!(solve(diagonal, entry(None, 0, 0, 1, 1.0)), Err(Error::BadCoefficient { .. })));
+    assert!(matches!(solve(square.clone(), entry(None, 0, 0, 0, f64::NAN)), Err(Error::NotFinite { .. })));
+    assert!(matches!(solve(square, entry(Some(0), 0, 0, 0, f64::INFINITY)), Err(Error::NotFinite { .. })));
+    let objective = Sdp { objective: vec![f64::NAN], blocks: vec![BlockShape::Diagonal(1)], coefficients: vec![] };
+    assert!(matches!(objective.solve(&options()), Err(Error::NotFinite { .. })));
+    let large = Sdp { objective: vec![0.0; 30_000], blocks: vec![BlockShape::Diagonal(1)], coefficients: vec![] };
+    assert!(matches!(large.solve(&options()), Err(Error::TooLarge { unknowns: 30_000, .. })));
 }
 
 #[test]
@@ -172,11 +99,7 @@ fn no_interior() {
         coefficients: vec![entry(Some(0), 0, 0, 0, 1.0), entry(None, 0, 0, 1, -1.0)],
     };
     let answer = problem.solve(&options()).unwrap();
-    assert!(
-        !matches!(answer.outcome, Outcome::Solved | Outcome::Unbounded(_)),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(!matches!(answer.outcome, Outcome::Solved | Outcome::Unbounded(_)), "{:?}", answer.outcome);
     // [x, y; y, 0] ⪰ 0 has solutions (y = 0) but no interior.
     let problem = Sdp {
         objective: vec![1.0, 1.0],

@@ -19,24 +19,14 @@ fn sample() -> (lmi::Answer, Expr, Expr, Expr) {
         let (rows, cols) = (difference.nrows(), difference.ncols());
         Expr::symmetric_blocks(vec![
             vec![Expr::constant(1e-6 * Mat::<f64>::identity(rows, rows))],
-            vec![
-                difference.t(),
-                Expr::constant(1e-6 * Mat::<f64>::identity(cols, cols)),
-            ],
+            vec![difference.t(), Expr::constant(1e-6 * Mat::<f64>::identity(cols, cols))],
         ])
     };
     problem.positive_definite("Y", around(&y, &matrix([[1.0, 0.3], [0.3, 2.0]])));
-    problem.positive_definite(
-        "L",
-        around(&l, &matrix([[0.1, -0.4, 0.9], [1.7, 0.2, -0.6]])),
-    );
+    problem.positive_definite("L", around(&l, &matrix([[0.1, -0.4, 0.9], [1.7, 0.2, -0.6]])));
     problem.positive_definite("t", around(&t, &matrix([[-0.7]])));
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
     (answer, y, l, t)
 }
 
@@ -49,28 +39,13 @@ fn expressions_evaluate_like_matrices() {
     assert!(close(&answer.value(&(&a * &y)), &(&a * &yv)));
     assert!(close(&answer.value(&(&y * &a)), &(&yv * &a)));
     assert!(close(&answer.value(&(&l.t() * &a)), &(lv.transpose() * &a)));
-    assert!(close(
-        &answer.value(&(&a * &l).t()),
-        &(&a * &lv).transpose().to_owned()
-    ));
-    assert!(close(
-        &answer.value(&(2.0 * &y - &a + y.clone() * 0.5)),
-        &(2.5 * &yv - &a)
-    ));
+    assert!(close(&answer.value(&(&a * &l).t()), &(&a * &lv).transpose().to_owned()));
+    assert!(close(&answer.value(&(2.0 * &y - &a + y.clone() * 0.5)), &(2.5 * &yv - &a)));
     assert!(close(&answer.value(&-(&a - &y)), &(&yv - &a)));
-    assert!(close(
-        &answer.value(&l.row(1)),
-        &lv.subrows(1, 1).to_owned()
-    ));
-    assert!(close(
-        &answer.value(&l.columns(1..3)),
-        &lv.subcols(1, 2).to_owned()
-    ));
+    assert!(close(&answer.value(&l.row(1)), &lv.subrows(1, 1).to_owned()));
+    assert!(close(&answer.value(&l.columns(1..3)), &lv.subcols(1, 2).to_owned()));
     assert!(close(&answer.value(&t.times(&a)), &(tv * &a)));
-    assert!(close(
-        &answer.value(&(&a * t.times(&a)).t()),
-        &(tv * &a * &a).transpose().to_owned()
-    ));
+    assert!(close(&answer.value(&(&a * t.times(&a)).t()), &(tv * &a * &a).transpose().to_owned()));
     let trace = answer.value(&(&a * &y + t.times(&a)).trace())[(0, 0)];
     let expected = (&a * &yv)[(0, 0)] + (&a * &yv)[(1, 1)] + tv * 1.5;
     assert!((trace - expected).abs() < 1e-12);
@@ -83,34 +58,19 @@ fn expressions_evaluate_like_matrices() {
 fn blocks_stand_where_they_are_put() {
     let (answer, y, l, _) = sample();
     let (yv, lv) = (answer.value(&y), answer.value(&l));
-    let f = answer.value(&Expr::symmetric_blocks(vec![
-        vec![y.clone()],
-        vec![l.t(), Expr::identity(3)],
-    ]));
+    let f = answer.value(&Expr::symmetric_blocks(vec![vec![y.clone()], vec![l.t(), Expr::identity(3)]]));
     assert!(close(&f.submatrix(0, 2, 2, 3).to_owned(), &lv));
-    assert!(close(
-        &f.submatrix(2, 0, 3, 2).to_owned(),
-        &lv.transpose().to_owned()
-    ));
+    assert!(close(&f.submatrix(2, 0, 3, 2).to_owned(), &lv.transpose().to_owned()));
     assert!(close(&f.submatrix(0, 0, 2, 2).to_owned(), &yv));
-    let g = answer.value(&Expr::blocks(vec![
-        vec![y.clone(), l.clone()],
-        vec![Expr::zeros(1, 2), l.row(0)],
-    ]));
-    assert!(close(
-        &g.submatrix(2, 2, 1, 3).to_owned(),
-        &lv.subrows(0, 1).to_owned()
-    ));
+    let g = answer.value(&Expr::blocks(vec![vec![y.clone(), l.clone()], vec![Expr::zeros(1, 2), l.row(0)]]));
+    assert!(close(&g.submatrix(2, 2, 1, 3).to_owned(), &lv.subrows(0, 1).to_owned()));
     assert!(close(&g.submatrix(0, 2, 2, 3).to_owned(), &lv));
 }
 
 /// The message of a panic.
 fn message(f: impl FnOnce()) -> String {
     let payload = catch_unwind(AssertUnwindSafe(f)).expect_err("a panic was expected");
-    payload
-        .downcast_ref::<String>()
-        .cloned()
-        .unwrap_or_default()
+    payload.downcast_ref::<String>().cloned().unwrap_or_default()
 }
 
 #[test]
@@ -132,26 +92,10 @@ fn wrong_sizes_panic_with_both_sizes() {
         let digits = text.chars().filter(char::is_ascii_digit).count();
         assert!(digits >= 2 && text.contains('×'), "{text}");
     }
-    let text = message(|| {
-        drop(Expr::symmetric_blocks(vec![
-            vec![y.clone()],
-            vec![l.clone(), y.clone()],
-        ]))
-    });
-    assert!(
-        text.contains("block (1, 0) is 2 × 3, 2 × 2 expected"),
-        "{text}"
-    );
-    let text = message(|| {
-        drop(Expr::symmetric_blocks(vec![
-            vec![y.clone()],
-            vec![y.clone()],
-        ]))
-    });
-    assert!(
-        text.contains("row 1") && text.contains("2 expected"),
-        "{text}"
-    );
+    let text = message(|| drop(Expr::symmetric_blocks(vec![vec![y.clone()], vec![l.clone(), y.clone()]])));
+    assert!(text.contains("block (1, 0) is 2 × 3, 2 × 2 expected"), "{text}");
+    let text = message(|| drop(Expr::symmetric_blocks(vec![vec![y.clone()], vec![y.clone()]])));
+    assert!(text.contains("row 1") && text.contains("2 expected"), "{text}");
     let text = message(|| drop(Expr::blocks(vec![vec![y.clone()], vec![l.clone()]])));
     assert!(text.contains("2 × 3"), "{text}");
 }
@@ -166,17 +110,7 @@ fn malformed_problems_are_errors() {
 
     problem.positive_definite("skew", &y + matrix([[0.0, 1.0], [0.0, 0.0]]));
     let error = problem.solve(&options).unwrap_err();
-    assert!(
-        matches!(
-            error,
-            Error::NotSymmetric {
-                row: 0,
-                column: 1,
-                ..
-            }
-        ),
-        "{error}"
-    );
+    assert!(matches!(error, Error::NotSymmetric { row: 0, column: 1, .. }), "{error}");
     assert!(error.to_string().contains("symmetric_blocks"), "{error}");
 
     let with = |f: Expr| {
@@ -185,66 +119,28 @@ fn malformed_problems_are_errors() {
         problem.positive_definite("F", f);
         problem.solve(&options)
     };
-    assert!(matches!(
-        with(l.clone()),
-        Err(Error::ForeignUnknown { .. } | Error::NotSquare { .. })
-    ));
-    assert!(matches!(
-        with(Expr::zeros(2, 3)),
-        Err(Error::NotSquare {
-            rows: 2,
-            columns: 3,
-            ..
-        })
-    ));
+    assert!(matches!(with(l.clone()), Err(Error::ForeignUnknown { .. } | Error::NotSquare { .. })));
+    assert!(matches!(with(Expr::zeros(2, 3)), Err(Error::NotSquare { rows: 2, columns: 3, .. })));
     assert!(matches!(with(y.clone()), Err(Error::ForeignUnknown { .. })));
     let nan = matrix([[1.0, f64::NAN], [f64::NAN, 1.0]]);
-    assert!(matches!(
-        with(Expr::constant(nan)),
-        Err(Error::NotFinite {
-            row: 1,
-            column: 0,
-            ..
-        })
-    ));
+    assert!(matches!(with(Expr::constant(nan)), Err(Error::NotFinite { row: 1, column: 0, .. })));
 
     let mut problem = Problem::new();
     let y = problem.symmetric("Y", 2);
     let a = matrix([[0.0, f64::INFINITY], [0.0, 0.0]]);
     problem.positive_definite("F", &a * &y + (&a * &y).t());
-    assert!(matches!(
-        problem.solve(&options),
-        Err(Error::NotFinite { .. })
-    ));
+    assert!(matches!(problem.solve(&options), Err(Error::NotFinite { .. })));
 
     let mut problem = Problem::new();
     let y = problem.symmetric("Y", 2);
     problem.positive_definite("Y", y.clone());
     problem.minimize(&y);
-    assert!(matches!(
-        problem.solve(&options),
-        Err(Error::ObjectiveNotScalar {
-            rows: 2,
-            columns: 2
-        })
-    ));
+    assert!(matches!(problem.solve(&options), Err(Error::ObjectiveNotScalar { rows: 2, columns: 2 })));
     problem.minimize(&y.trace());
-    let bad = Options {
-        gap_tolerance: -1.0,
-        ..Options::default()
-    };
-    assert!(matches!(
-        problem.solve(&bad),
-        Err(Error::BadOption {
-            option: "gap_tolerance",
-            ..
-        })
-    ));
+    let bad = Options { gap_tolerance: -1.0, ..Options::default() };
+    assert!(matches!(problem.solve(&bad), Err(Error::BadOption { option: "gap_tolerance", .. })));
     problem.positive_definite_by("Y", y, f64::NAN);
-    assert!(matches!(
-        problem.solve(&options),
-        Err(Error::NotFinite { .. })
-    ));
+    assert!(matches!(problem.solve(&options), Err(Error::NotFinite { .. })));
 }
 
 #[test]
@@ -253,10 +149,7 @@ fn wrong_signs_are_told_from_right_ones() {
     let mut problem = Problem::new();
     let y = problem.symmetric("Y", 2);
     problem.positive_definite("A Y", matrix([[1.0, 2.0], [0.0, 1.0]]) * &y);
-    assert!(matches!(
-        problem.solve(&Options::default()),
-        Err(Error::NotSymmetric { .. })
-    ));
+    assert!(matches!(problem.solve(&Options::default()), Err(Error::NotSymmetric { .. })));
 }
 
 #[test]
@@ -277,15 +170,18 @@ fn sharing_one_unknown_between_sparse_and_factored_parts() {
         problem.positive_definite("A − tI", &a - shifted);
         problem.maximize(&t);
         let answer = problem.solve(&Options::default()).unwrap();
-        assert!(
-            matches!(answer.outcome, Outcome::Solved),
-            "{way}: {:?}",
-            answer.outcome
-        );
-        assert!(
-            (answer.objective - expected).abs() < 1e-7,
-            "{way}: {} {expected}",
-            answer.objective
-        );
+        assert!(matches!(answer.outcome, Outcome::Solved), "{way}: {:?}", answer.outcome);
+        assert!((answer.objective - expected).abs() < 1e-7, "{way}: {} {expected}", answer.objective);
     }
+}
+
+/// Callers solve many problems in parallel.
+#[test]
+fn everything_can_move_between_threads() {
+    fn check<T: Send + Sync>() {}
+    check::<Problem>();
+    check::<Expr>();
+    check::<Options>();
+    check::<lmi::Answer>();
+    check::<lmi::sdpa::Sdp>();
 }

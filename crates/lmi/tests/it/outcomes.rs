@@ -20,29 +20,16 @@ fn lyapunov(a: &Mat<f64>) -> (Problem, Answer) {
 #[test]
 fn a_stable_matrix_has_a_lyapunov_function() {
     let (_, answer) = lyapunov(&matrix([[-1.0, 5.0], [0.0, -2.0]]));
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
-    assert!(
-        answer
-            .blocks
-            .iter()
-            .all(|block| block.smallest_eigenvalue > 0.0)
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
+    assert!(answer.blocks.iter().all(|block| block.smallest_eigenvalue > 0.0));
 }
 
 #[test]
 fn an_unstable_matrix_has_none_and_the_witness_proves_it() {
     let a = matrix([[0.5, 1.0], [0.0, -2.0]]);
     let (_, answer) = lyapunov(&a);
-    let Outcome::Infeasible(witness) = &answer.outcome else {
-        panic!("{:?}", answer.outcome)
-    };
-    let [decay, bound] = &witness.multipliers[..] else {
-        panic!("two multipliers expected")
-    };
+    let Outcome::Infeasible(witness) = &answer.outcome else { panic!("{:?}", answer.outcome) };
+    let [decay, bound] = &witness.multipliers[..] else { panic!("two multipliers expected") };
     // ⟨−(AᵀP + PA), Z₁⟩ + ⟨P − I, Z₂⟩ = ⟨P, Z₂ − AZ₁ − Z₁Aᵀ⟩ − tr Z₂ for all P.
     let coefficient = bound - &a * decay - decay * a.transpose();
     assert!(coefficient.norm_max() < 1e-6, "{coefficient:?}");
@@ -61,9 +48,7 @@ fn contradictory_bounds_are_infeasible() {
     problem.positive_definite("t < 0", -&t);
     problem.minimize(&t);
     let answer = problem.solve(&Options::default()).unwrap();
-    let Outcome::Infeasible(witness) = &answer.outcome else {
-        panic!("{:?}", answer.outcome)
-    };
+    let Outcome::Infeasible(witness) = &answer.outcome else { panic!("{:?}", answer.outcome) };
     assert!((witness.multipliers[0][(0, 0)] - 1.0).abs() < 1e-6);
     assert!((witness.multipliers[1][(0, 0)] - 1.0).abs() < 1e-6);
 }
@@ -92,9 +77,7 @@ fn an_objective_without_end_comes_with_its_ray() {
     problem.positive_definite("Y", &y - Expr::identity(2));
     problem.maximize(&y.trace());
     let answer = problem.solve(&Options::default()).unwrap();
-    let Outcome::Unbounded(ray) = &answer.outcome else {
-        panic!("{:?}", answer.outcome)
-    };
+    let Outcome::Unbounded(ray) = &answer.outcome else { panic!("{:?}", answer.outcome) };
     let d = &ray.direction[0];
     assert!((d[(0, 0)] + d[(1, 1)] - 1.0).abs() < 1e-6);
     assert!(d.self_adjoint_eigenvalues(faer::Side::Lower).unwrap()[0] > -1e-7);
@@ -107,28 +90,17 @@ fn an_unknown_in_the_objective_alone_is_unbounded() {
     problem.positive_definite("Y", y.clone());
     problem.minimize(&(&y.trace() + &t));
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Unbounded(_)),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Unbounded(_)), "{:?}", answer.outcome);
 }
 
 #[test]
 fn an_unused_unknown_stays_put() {
     let mut problem = Problem::new();
-    let (y, unused) = (
-        problem.symmetric("Y", 2),
-        problem.rectangular("unused", 2, 2),
-    );
+    let (y, unused) = (problem.symmetric("Y", 2), problem.rectangular("unused", 2, 2));
     problem.positive_definite("Y", &y - Expr::identity(2));
     problem.minimize(&y.trace());
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
     assert!((answer.objective - 2.0).abs() < 1e-7);
     assert_eq!(answer.value(&unused).norm_max(), 0.0);
 }
@@ -141,11 +113,7 @@ fn dependent_unknowns_are_met_by_regularisation() {
     problem.positive_definite("A + B", &a + &b - Expr::identity(3));
     problem.minimize(&(&a + &b).trace());
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
     assert!((answer.objective - 3.0).abs() < 1e-7);
 }
 
@@ -153,32 +121,14 @@ fn dependent_unknowns_are_met_by_regularisation() {
 fn limits_end_the_solve_with_the_point_so_far() {
     let (problem, _) = crate::quadrotor::low_gain(20.0);
     let solve = |options: Options| problem.solve(&options).unwrap();
-    let answer = solve(Options {
-        max_iterations: 3,
-        ..Options::default()
-    });
-    assert!(matches!(
-        answer.outcome,
-        Outcome::Inaccurate(InaccurateReason::IterationLimit)
-    ));
+    let answer = solve(Options { max_iterations: 3, ..Options::default() });
+    assert!(matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::IterationLimit)));
     assert!(answer.iterations.len() <= 4 && answer.objective.is_finite());
-    let answer = solve(Options {
-        time_limit: Some(Duration::ZERO),
-        ..Options::default()
-    });
-    assert!(matches!(
-        answer.outcome,
-        Outcome::Inaccurate(InaccurateReason::TimeLimit)
-    ));
+    let answer = solve(Options { time_limit: Some(Duration::ZERO), ..Options::default() });
+    assert!(matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::TimeLimit)));
     let cancel = Some(Arc::new(AtomicBool::new(true)));
-    let answer = solve(Options {
-        cancel,
-        ..Options::default()
-    });
-    assert!(matches!(
-        answer.outcome,
-        Outcome::Inaccurate(InaccurateReason::Cancelled)
-    ));
+    let answer = solve(Options { cancel, ..Options::default() });
+    assert!(matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::Cancelled)));
 }
 
 #[test]
@@ -188,15 +138,9 @@ fn a_margin_of_ones_own_is_kept() {
     problem.positive_definite_by("Y", y.clone(), 0.25);
     problem.minimize(&y.trace());
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
     assert!((answer.objective - 0.75).abs() < 1e-7);
-    assert!(
-        answer.blocks[0].smallest_eigenvalue >= 0.25 - 1e-14 && answer.blocks[0].margin == 0.25
-    );
+    assert!(answer.blocks[0].smallest_eigenvalue >= 0.25 - 1e-14 && answer.blocks[0].margin == 0.25);
 }
 
 #[test]
@@ -204,10 +148,6 @@ fn a_problem_without_unknowns_is_a_check() {
     let mut problem = Problem::new();
     problem.positive_definite("known", Expr::identity(2));
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
     assert!((answer.blocks[0].smallest_eigenvalue - 1.0).abs() < 1e-14);
 }

@@ -9,9 +9,7 @@ pub fn matrix<const R: usize, const C: usize>(rows: [[f64; C]; R]) -> Mat<f64> {
 
 /// A diagonal matrix.
 pub fn diagonal(entries: &[f64]) -> Mat<f64> {
-    Mat::from_fn(entries.len(), entries.len(), |i, j| {
-        if i == j { entries[i] } else { 0.0 }
-    })
+    Mat::from_fn(entries.len(), entries.len(), |i, j| if i == j { entries[i] } else { 0.0 })
 }
 
 /// ẋ = Ax + Bu with the weights of ∫ xᵀQx + uᵀRu dt, inverted.
@@ -44,13 +42,6 @@ pub fn quadrotor(yaw_rad: f64) -> Plant {
     }
     (b[(6, 1)], b[(6, 3)]) = (ARM / INERTIA[0], -ARM / INERTIA[0]);
     (b[(7, 2)], b[(7, 0)]) = (ARM / INERTIA[1], -ARM / INERTIA[1]);
-    let q = [
-        1.0, 1.0, 100.0, 1.0, 1.0, 50.0, 50.0, 50.0, 50.0, 1.0, 1.0, 100.0,
-    ];
-    Plant {
-        a,
-        b,
-        q_inverse: diagonal(&q.map(|q| 1.0 / q)),
-        r_inverse: diagonal(&[1000.0; 4]),
-    }
+    let q = [1.0, 1.0, 100.0, 1.0, 1.0, 50.0, 50.0, 50.0, 50.0, 1.0, 1.0, 100.0];
+    Plant { a, b, q_inverse: diagonal(&q.map(|q| 1.0 / q)), r_inverse: diagonal(&[1000.0; 4]) }
 }

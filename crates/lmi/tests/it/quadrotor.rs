@@ -57,18 +57,9 @@ pub fn high_gain(gamma: f64) -> (Problem, Expr) {
 
 fn check(problem: &Problem, y: &Expr, expected: f64) -> Answer {
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}, {:?}",
-        answer.outcome,
-        answer.residuals
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}, {:?}", answer.outcome, answer.residuals);
     // The expected values have six decimals.
-    assert!(
-        (answer.objective - expected).abs() < 6e-7,
-        "tr Y = {:.9}, {expected} expected",
-        answer.objective
-    );
+    assert!((answer.objective - expected).abs() < 6e-7, "tr Y = {:.9}, {expected} expected", answer.objective);
     assert!((answer.value(&y.trace())[(0, 0)] - answer.objective).abs() < 1e-12);
     assert!(answer.residuals.gap <= 1e-7 && answer.residuals.dual <= 1e-7);
     for block in &answer.blocks {

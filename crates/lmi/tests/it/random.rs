@@ -9,10 +9,7 @@ struct Numbers(u64);
 
 impl Numbers {
     fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         ((self.0 >> 33) as f64) / f64::from(1_u32 << 30) - 1.0
     }
 
@@ -31,9 +28,7 @@ impl Numbers {
 }
 
 fn inner(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
-    (0..a.ncols())
-        .map(|j| (0..a.nrows()).map(|i| a[(i, j)] * b[(i, j)]).sum::<f64>())
-        .sum()
+    (0..a.ncols()).map(|j| (0..a.nrows()).map(|i| a[(i, j)] * b[(i, j)]).sum::<f64>()).sum()
 }
 
 /// Q diag(d) Qᵀ.
@@ -54,20 +49,12 @@ struct Instance {
 impl Instance {
     fn modelled(&self) -> Problem {
         let mut problem = Problem::new();
-        let x: Vec<Expr> = (0..self.c.len())
-            .map(|i| problem.scalar(format!("x{i}")))
-            .collect();
+        let x: Vec<Expr> = (0..self.c.len()).map(|i| problem.scalar(format!("x{i}"))).collect();
         for (b, constant) in self.constants.iter().enumerate() {
-            let f = x
-                .iter()
-                .zip(&self.coefficients[b])
-                .fold(Expr::from(constant), |f, (x, m)| f + x.times(m));
+            let f = x.iter().zip(&self.coefficients[b]).fold(Expr::from(constant), |f, (x, m)| f + x.times(m));
             problem.positive_definite_by(format!("F{b}"), f, 0.0);
         }
-        let cost = x
-            .iter()
-            .zip(&self.c)
-            .fold(Expr::zeros(1, 1), |sum, (x, &c)| sum + c * x);
+        let cost = x.iter().zip(&self.c).fold(Expr::zeros(1, 1), |sum, (x, &c)| sum + c * x);
         problem.minimize(&cost);
         problem
     }
@@ -77,41 +64,21 @@ impl Instance {
         let mut add = |unknown: Option<usize>, block: usize, m: &Mat<f64>, sign: f64| {
             for column in 0..m.ncols() {
                 for row in 0..=column {
-                    coefficients.push(Coefficient {
-                        unknown,
-                        block,
-                        row,
-                        column,
-                        value: sign * m[(row, column)],
-                    });
+                    coefficients.push(Coefficient { unknown, block, row, column, value: sign * m[(row, column)] });
                 }
             }
         };
         for (block, constant) in self.constants.iter().enumerate() {
             add(None, block, constant, -1.0);
-            self.coefficients[block]
-                .iter()
-                .enumerate()
-                .for_each(|(i, m)| add(Some(i), block, m, 1.0));
+            self.coefficients[block].iter().enumerate().for_each(|(i, m)| add(Some(i), block, m, 1.0));
         }
-        let blocks = self
-            .constants
-            .iter()
-            .map(|m| BlockShape::Symmetric(m.nrows()))
-            .collect();
-        Sdp {
-            objective: self.c.clone(),
-            blocks,
-            coefficients,
-        }
+        let blocks = self.constants.iter().map(|m| BlockShape::Symmetric(m.nrows())).collect();
+        Sdp { objective: self.c.clone(), blocks, coefficients }
     }
 
     fn outcomes(&self) -> [lmi::Answer; 2] {
         let options = Options::default();
-        [
-            self.modelled().solve(&options).unwrap(),
-            self.sdp().solve(&options).unwrap(),
-        ]
+        [self.modelled().solve(&options).unwrap(), self.sdp().solve(&options).unwrap()]
     }
 }
 

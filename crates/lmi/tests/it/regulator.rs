@@ -22,20 +22,12 @@ fn double_integrator_matches_the_riccati_equation() {
         Expr::symmetric_blocks(vec![
             vec![-(&s + s.t())],
             vec![y.clone(), Expr::constant(diagonal(&[1.0 / q1, 1.0 / q2]))],
-            vec![
-                l.clone(),
-                Expr::zeros(1, 2),
-                Expr::constant(matrix([[1.0 / r]])),
-            ],
+            vec![l.clone(), Expr::zeros(1, 2), Expr::constant(matrix([[1.0 / r]]))],
         ]),
     );
     problem.maximize(&y.trace());
     let answer = problem.solve(&Options::default()).unwrap();
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{:?}",
-        answer.outcome
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
 
     // Y P = I to the square root of the gap: the objective is flat at the optimum.
     let y = answer.value(&y);
@@ -44,22 +36,12 @@ fn double_integrator_matches_the_riccati_equation() {
     for i in 0..2 {
         for j in 0..2 {
             let identity = if i == j { 1.0 } else { 0.0 };
-            assert!(
-                (product[(i, j)] - identity).abs() < 1e-5,
-                "Y P = {product:?}"
-            );
+            assert!((product[(i, j)] - identity).abs() < 1e-5, "Y P = {product:?}");
         }
     }
     let trace = (p11 + p22) / (p11 * p22 - p12 * p12);
-    assert!(
-        (answer.objective - trace).abs() < 1e-7 * trace,
-        "{} {trace}",
-        answer.objective
-    );
+    assert!((answer.objective - trace).abs() < 1e-7 * trace, "{} {trace}", answer.objective);
     // K = L Y⁻¹ = R⁻¹BᵀP.
     let k = answer.value(&l) * &p;
-    assert!(
-        (k[(0, 0)] - p12 / r).abs() < 1e-3 && (k[(0, 1)] - p22 / r).abs() < 1e-3,
-        "{k:?}"
-    );
+    assert!((k[(0, 0)] - p12 / r).abs() < 1e-3 && (k[(0, 1)] - p22 / r).abs() < 1e-3, "{k:?}");
 }

@@ -8,21 +8,9 @@ const PLAIN: &str = "2\n2\n2 -3\n1.0 -2.5\n0 1 1 2 1.5\n1 2 3 3 1\n2 1 2 2 -4e-1
 #[test]
 fn punctuation_comments_and_remarks_do_not_matter() {
     let plain = read(PLAIN.as_bytes()).unwrap();
-    assert_eq!(
-        plain.blocks,
-        [BlockShape::Symmetric(2), BlockShape::Diagonal(3)]
-    );
+    assert_eq!(plain.blocks, [BlockShape::Symmetric(2), BlockShape::Diagonal(3)]);
     assert_eq!(plain.objective, [1.0, -2.5]);
-    assert_eq!(
-        plain.coefficients[0],
-        Coefficient {
-            unknown: None,
-            block: 0,
-            row: 0,
-            column: 1,
-            value: 1.5
-        }
-    );
+    assert_eq!(plain.coefficients[0], Coefficient { unknown: None, block: 0, row: 0, column: 1, value: 1.5 });
     assert_eq!(plain.coefficients.len(), 3);
     let odd = "\"a title\n* a remark\n 2 =mDIM\n2=nBLOCK\n {2,\n -3} = bLOCKsTRUCT\n{1.0D0, -25.0d-1}\r\n\n0 1 2 1 +1.5\n\
                {1, 2, 3, 3} 1\n2 1\n2 2 -.4\n";
@@ -39,10 +27,7 @@ fn error(text: &str) -> (ReadError, usize) {
         | ReadError::OutOfRange { line, .. }
         | ReadError::OffDiagonal { line, .. } => *line,
     };
-    assert!(
-        error.to_string().starts_with(&format!("line {line}: ")),
-        "{error}"
-    );
+    assert!(error.to_string().starts_with(&format!("line {line}: ")), "{error}");
     (error, line)
 }
 
@@ -79,13 +64,7 @@ fn errors_name_the_line() {
 
 #[test]
 fn off_diagonal_zeros_of_diagonal_blocks_are_let_pass() {
-    assert!(
-        read("1\n1\n-2\n1\n1 1 1 2 0.0\n1 1 1 1 1\n".as_bytes())
-            .unwrap()
-            .coefficients
-            .len()
-            == 1
-    );
+    assert!(read("1\n1\n-2\n1\n1 1 1 2 0.0\n1 1 1 1 1\n".as_bytes()).unwrap().coefficients.len() == 1);
 }
 
 proptest! {

@@ -9,10 +9,8 @@ use std::path::{Path, PathBuf};
 fn solve(name: &str) -> Option<Answer> {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let file = format!("{name}.dat-s");
-    let places: [PathBuf; 2] = [
-        here.join("tests/data").join(&file),
-        here.join("../../../shared/data/sdplib").join(&file),
-    ];
+    let places: [PathBuf; 2] =
+        [here.join("tests/data").join(&file), here.join("../../../shared/data/sdplib").join(&file)];
     let Some(path) = places.iter().find(|path| path.is_file()) else {
         println!("{name}: skipped, no file {file}");
         return None;
@@ -23,23 +21,10 @@ fn solve(name: &str) -> Option<Answer> {
 
 fn check(name: &str, optimum: f64, tolerance: f64) {
     let Some(answer) = solve(name) else { return };
-    assert!(
-        matches!(answer.outcome, Outcome::Solved),
-        "{name}: {:?} {:?}",
-        answer.outcome,
-        answer.residuals
-    );
+    assert!(matches!(answer.outcome, Outcome::Solved), "{name}: {:?} {:?}", answer.outcome, answer.residuals);
     let error = (answer.objective - optimum).abs() / optimum.abs();
-    assert!(
-        error < tolerance,
-        "{name}: {} instead of {optimum}",
-        answer.objective
-    );
-    assert!(
-        answer.residuals.gap <= 1e-7
-            && answer.residuals.primal <= 1e-7
-            && answer.residuals.dual <= 1e-7
-    );
+    assert!(error < tolerance, "{name}: {} instead of {optimum}", answer.objective);
+    assert!(answer.residuals.gap <= 1e-7 && answer.residuals.primal <= 1e-7 && answer.residuals.dual <= 1e-7);
 }
 
 /// The published optima have seven digits.
@@ -67,19 +52,12 @@ fn graphs() {
 /// Problems without interior: the digits that are known, and no claim beyond them.
 #[test]
 fn ill_posed_control() {
-    for (name, optimum, tolerance) in [
-        ("hinf1", 2.0326, 1e-3),
-        ("hinf2", 10.967, 1e-3),
-        ("hinf3", 56.9, 5e-3),
-        ("hinf13", 46.0, 5e-2),
-    ] {
+    for (name, optimum, tolerance) in
+        [("hinf1", 2.0326, 1e-3), ("hinf2", 10.967, 1e-3), ("hinf3", 56.9, 5e-3), ("hinf13", 46.0, 5e-2)]
+    {
         let Some(answer) = solve(name) else { continue };
         let error = (answer.objective - optimum).abs() / optimum;
-        assert!(
-            error < tolerance,
-            "{name}: {} instead of {optimum}",
-            answer.objective
-        );
+        assert!(error < tolerance, "{name}: {} instead of {optimum}", answer.objective);
         match answer.outcome {
             Outcome::Solved => assert!(answer.residuals.gap <= 1e-7),
             Outcome::Inaccurate(_) => {}
@@ -92,17 +70,9 @@ fn ill_posed_control() {
 #[test]
 fn infeasible_ones() {
     if let Some(answer) = solve("infp1") {
-        assert!(
-            matches!(answer.outcome, Outcome::Infeasible(_)),
-            "{:?}",
-            answer.outcome
-        );
+        assert!(matches!(answer.outcome, Outcome::Infeasible(_)), "{:?}", answer.outcome);
     }
     if let Some(answer) = solve("infd1") {
-        assert!(
-            matches!(answer.outcome, Outcome::Unbounded(_)),
-            "{:?}",
-            answer.outcome
-        );
+        assert!(matches!(answer.outcome, Outcome::Unbounded(_)), "{:?}", answer.outcome);
     }
 }

@@ -68,10 +68,7 @@ pub struct NoiseTable {
 }
 
 #[derive(Deserialize)]
-#[serde(
-    untagged,
-    expecting = "expected a number for all inputs, or a list with one for each"
-)]
+#[serde(untagged, expecting = "expected a number for all inputs, or a list with one for each")]
 pub enum Bound {
     All(f64),
     Each(Vec<f64>),
@@ -141,37 +138,65 @@ pub(super) fn plant(door: &Door, mut table: toml::Table) -> Result<PlantSpec, Fa
     let name = match table.remove("name") {
         Some(toml::Value::String(name)) => name,
         Some(other) => {
-            return door.refuse(
-                "plant.name",
-                format!("is a {}: allowed are {NAMES}", other.type_str()),
-            );
+            return door.refuse("plant.name", format!("is of type {}: allowed are {NAMES}", other.type_str()));
         }
         None => return door.refuse("plant.name", format!("is missing: allowed are {NAMES}")),
     };
     match name.as_str() {
-        "quadrotor" => Ok(PlantSpec::Quadrotor(parameters::<QuadrotorParameters>(
-            door, table,
-        )?)),
-        "linear" => Ok(PlantSpec::Linear(parameters::<LinearParameters>(
-            door, table,
-        )?)),
+        "quadrotor" => Ok(PlantSpec::Quadrotor(parameters::<QuadrotorParameters>(door, table)?)),
+        "linear" => Ok(PlantSpec::Linear(parameters::<LinearParameters>(door, table)?)),
         "pendulum" | "double-integrator" => match table.keys().next() {
-            Some(key) => door.refuse(
-                format!("plant.{key}"),
-                format!("plant \"{name}\" has no parameters; remove it"),
-            ),
+            Some(key) => door.refuse(format!("plant.{key}"), format!("plant \"{name}\" has no parameters; remove it")),
             None if name == "pendulum" => Ok(PlantSpec::Pendulum {}),
             None => Ok(PlantSpec::DoubleIntegrator {}),
         },
-        _ => door.refuse(
-            "plant.name",
-            format!("\"{name}\" is not a plant: allowed are {NAMES}"),
-        ),
+        _ => door.refuse("plant.name", format!("\"{name}\" is not a plant: allowed are {NAMES}")),
     }
 }
 
 fn parameters<T: DeserializeOwned>(door: &Door, table: toml::Table) -> Result<T, Failure> {
-    table
-        .try_into()
-        .or_else(|error: toml::de::Error| door.refuse("plant", error.to_string().trim_end()))
+    table.try_into().or_else(|error: toml::de::Error| {
+        let message = engineers_words(error.to_string().trim_end());
+        door.refuse("plant", message.replace('\n', " "))
+    })
+}
+
+/// What is wrong with a file that is not the TOML of a scenario, and where: one line.
+pub(super) fn toml_message(text: &str, error: &toml::de::Error) -> String {
+    /// Characters of the line that are shown.
+    const SHOWN: usize = 60;
+    let message = engineers_words(error.message());
+    let Some(before) = error.span().and_then(|span| text.get(..span.start)) else {
+        return message;
+    };
+    let start = before.rfind('\n').map_or(0, |end| end + 1);
+    let line = text[start..].lines().next().unwrap_or("").trim();
+    let mut shown: String = line.chars().take(SHOWN).collect();
+    if shown.len() < line.len() {
+        shown.push('…');
+    }
+    format!(
+        "line {}, column {}: `{shown}`: {message}",
+        before.matches('\n').count() + 1,
+        before[start..].chars().count() + 1
+    )
+}
+
+/// A parser's message in the words of the file instead of Rust's.
+pub fn engineers_words(message: &str) -> String {
+    [
+        ("unknown field", "unknown key"),
+        ("missing field", "missing key"),
+        ("unknown variant", "unknown value"),
+        ("expected usize", "expected a whole number, zero or more"),
+        ("expected u64", "expected a whole number, zero or more"),
+        ("expected f64", "expected a number"),
+        ("expected struct", "expected the table"),
+        ("expected a sequence", "expected a list"),
+        ("expected a map", "expected a table"),
+        ("invalid type: map", "invalid type: table"),
+        ("invalid type: sequence", "invalid type: list"),
+    ]
+    .into_iter()
+    .fold(message.to_owned(), |message, (theirs, ours)| message.replace(theirs, ours))
 }

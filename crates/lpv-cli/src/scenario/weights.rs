@@ -8,13 +8,7 @@ use lpv::math::eigen::smallest_eigenvalue;
 use lpv::math::matrix::{diagonal, from_rows, inverse_spd, is_finite, is_symmetric};
 
 /// A symmetric positive definite matrix from `key` (in full) or `key_diag`.
-pub(super) fn definite(
-    door: &Door,
-    key: &str,
-    rows: Rows,
-    diag: Diagonal,
-    size: usize,
-) -> Result<Mat<f64>, Failure> {
+pub(super) fn definite(door: &Door, key: &str, rows: Rows, diag: Diagonal, size: usize) -> Result<Mat<f64>, Failure> {
     let (key, matrix) = square(door, key, rows, diag, size)?;
     // by Cholesky: computed eigenvalues are off by a rounding error of the largest
     match inverse_spd(&matrix) {
@@ -42,39 +36,37 @@ pub(super) fn semidefinite(
     let least = smallest_eigenvalue(&matrix);
     match least >= -1e-12 * matrix.norm_max() {
         true => Ok(matrix),
-        false => door.refuse(key, format!("is not positive semidefinite: its smallest eigenvalue is {least:.6e}; it cannot be below zero")),
+        false => door.refuse(
+            key,
+            format!("is not positive semidefinite: its smallest eigenvalue is {least:.6e}; it cannot be below zero"),
+        ),
     }
 }
 
 /// The matrix, and the key that it was given under.
-fn square(
-    door: &Door,
-    key: &str,
-    rows: Rows,
-    diag: Diagonal,
-    size: usize,
-) -> Result<(String, Mat<f64>), Failure> {
+fn square(door: &Door, key: &str, rows: Rows, diag: Diagonal, size: usize) -> Result<(String, Mat<f64>), Failure> {
     let (key, matrix) = match (rows, diag) {
         (Some(_), Some(_)) => {
-            return door.refuse(
-                key,
-                format!("both {key} and {key}_diag are given; keep one"),
-            );
+            return door.refuse(key, format!("both {key} and {key}_diag are given; keep one"));
         }
         (None, None) => {
-            return door.refuse(key, format!("is missing: give {key} as {size} rows of {size} numbers, or {key}_diag as {size} numbers"));
+            return door.refuse(
+                key,
+                format!("is missing: give {key} as {size} rows of {size} numbers, or {key}_diag as {size} numbers"),
+            );
         }
         (None, Some(entries)) => {
             let key = format!("{key}_diag");
             if entries.len() != size {
-                return door.refuse(
-                    key,
-                    format!("has {} numbers: the plant needs {size}", entries.len()),
-                );
+                return door.refuse(key, format!("has {} numbers: the plant needs {size}", entries.len()));
             }
             (key, diagonal(&entries))
         }
         (Some(rows), None) => {
+            if rows.is_empty() {
+                let message = format!("has no rows: the plant needs a {size} × {size} matrix");
+                return door.refuse(key, message);
+            }
             if rows.len() != size || rows.iter().any(|row| row.len() != size) {
                 let widths: Vec<String> = rows.iter().map(|row| row.len().to_string()).collect();
                 let message = format!(
@@ -91,10 +83,7 @@ fn square(
         return door.refuse(key, "has an entry that is not finite");
     }
     if !is_symmetric(&matrix, 1e-12) {
-        return door.refuse(
-            key,
-            "is not symmetric; entries (i, j) and (j, i) have to be equal",
-        );
+        return door.refuse(key, "is not symmetric; entries (i, j) and (j, i) have to be equal");
     }
     Ok((key, matrix))
 }

@@ -19,45 +19,28 @@ pub struct BlockMargin {
 /// λ_min of every block of the inequalities at one grid point of a design: (4.36) for LPVQR; (5.18), (5.19) for SLPVQR;
 /// (5.20) for all 2^m mixtures and (5.21) for high gain.
 ///
-/// The blocks are in Y = P⁻¹ and L = KY, as printed. `model` is the linearisation at the point's parameter.
-pub fn block_margins(
-    design: &Design,
-    point: &FrozenDesign,
-    model: &FrozenModel,
-) -> Vec<BlockMargin> {
-    let mut margins = vec![BlockMargin {
-        name: "P".into(),
-        smallest_eigenvalue: smallest_eigenvalue(&point.p),
-    }];
-    let inverses = (
-        inverse_spd(&point.p),
-        inverse_spd(&design.weights.q),
-        inverse_spd(&design.weights.r),
-    );
+/// The blocks are in Y = P⁻¹ and L = KY, as printed, with the K that flies: the schedule's, not the point's. `model` is the
+/// linearisation at the point's parameter.
+pub fn block_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> Vec<BlockMargin> {
+    let mut margins = vec![BlockMargin { name: "P".into(), smallest_eigenvalue: smallest_eigenvalue(&point.p) }];
+    let gain = design.controller.schedule.gain_matrix(point.rho);
+    let inverses = (inverse_spd(&point.p), inverse_spd(&design.weights.q), inverse_spd(&design.weights.r));
     let (Some(y), Some(q_inverse), Some(r_inverse)) = inverses else {
-        margins.push(BlockMargin {
-            name: "P, Q, R invertible".into(),
-            smallest_eigenvalue: f64::NAN,
-        });
+        margins.push(BlockMargin { name: "P, Q, R invertible".into(), smallest_eigenvalue: f64::NAN });
         return margins;
     };
-    let performance =
-        |gain: &Mat<f64>| performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
+    let performance = |gain: &Mat<f64>| performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
 
     match &point.auxiliary_gain {
         None => margins.push(BlockMargin {
             name: "performance".into(),
-            smallest_eigenvalue: smallest_eigenvalue(&performance(&point.gain)),
+            smallest_eigenvalue: smallest_eigenvalue(&performance(&gain)),
         }),
         Some(auxiliary) => {
-            let inputs = point.gain.nrows();
+            let inputs = gain.nrows();
             margins.extend((0..1usize << inputs).map(|vertex| {
-                let mixture = Mat::from_fn(inputs, point.gain.ncols(), |i, j| {
-                    if vertex >> i & 1 == 1 {
-                        point.gain[(i, j)]
-                    } else {
-                        auxiliary[(i, j)]
-                    }
+                let mixture = Mat::from_fn(inputs, gain.ncols(), |i, j| {
+                    if vertex >> i & 1 == 1 { gain[(i, j)] } else { auxiliary[(i, j)] }
                 });
                 BlockMargin {
                     name: format!("performance of mixture {vertex:0inputs$b}"),
@@ -67,19 +50,13 @@ pub fn block_margins(
         }
     }
     let limits = &design.controller.limits;
-    if let (Some(gamma), Some(sigma)) = (
-        design.method.gamma(),
-        limits.symmetric_bound(&design.controller.operating_input),
-    ) {
-        let unsaturated = point.auxiliary_gain.as_ref().unwrap_or(&point.gain) * &y;
+    if let (Some(gamma), Some(sigma)) =
+        (design.method.gamma(), limits.symmetric_bound(&design.controller.operating_input))
+    {
+        let unsaturated = point.auxiliary_gain.as_ref().unwrap_or(&gain) * &y;
         margins.extend(sigma.iter().enumerate().map(|(i, bound)| BlockMargin {
             name: format!("input {} unsaturated", i + 1),
-            smallest_eigenvalue: smallest_eigenvalue(&unsaturated_block(
-                &y,
-                &unsaturated,
-                i,
-                bound * bound / gamma,
-            )),
+            smallest_eigenvalue: smallest_eigenvalue(&unsaturated_block(&y, &unsaturated, i, bound * bound / gamma)),
         }));
     }
     margins

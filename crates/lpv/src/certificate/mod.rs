@@ -9,7 +9,7 @@ mod region;
 mod stability;
 
 pub use inequality::{BlockMargin, block_margins};
-pub use region::{CertifiedStep, certified_step, unsaturated_level};
+pub use region::{StepBound, StepConditions, UnmetCondition, step_bound, unsaturated_level};
 pub use stability::{StabilityMargin, frozen_stability};
 
 use crate::model::linearize;
@@ -75,11 +75,7 @@ pub fn check(design: &Design, plant: &dyn Plant) -> Vec<Claim> {
         None => "at the operating point".into(),
     };
     let verdict = |margin: f64| {
-        if margin > 0.0 {
-            Verdict::Numerical
-        } else {
-            Verdict::Refuted
-        }
+        if margin > 0.0 { Verdict::Numerical } else { Verdict::Refuted }
     };
     claims.push(Claim {
         claim: "frozen closed loop is stable".into(),
@@ -92,17 +88,10 @@ pub fn check(design: &Design, plant: &dyn Plant) -> Vec<Claim> {
         ),
     });
     claims.push(Claim {
-        claim: format!(
-            "sampled closed loop is stable at T = {} s",
-            design.sample_time_s
-        ),
+        claim: format!("sampled closed loop is stable at T = {} s", design.sample_time_s),
         verdict: verdict(1.0 - stability.radius),
         margin: 1.0 - stability.radius,
-        detail: format!(
-            "max |λ| = {:.6} {}, {count} parameter values",
-            stability.radius,
-            at(stability.radius_at)
-        ),
+        detail: format!("max |λ| = {:.6} {}, {count} parameter values", stability.radius, at(stability.radius_at)),
     });
     claims
 }
@@ -111,29 +100,18 @@ fn inequalities_claim(design: &Design, plant: &dyn Plant) -> Claim {
     let margins: Vec<(f64, BlockMargin)> = (design.points.iter())
         .flat_map(|point| {
             let model = linearize(plant, point.rho);
-            block_margins(design, point, &model)
-                .into_iter()
-                .map(|block| (point.rho, block))
+            block_margins(design, point, &model).into_iter().map(|block| (point.rho, block))
         })
         .collect();
     let claim = "matrix inequalities hold at every grid point".to_string();
-    let worst = margins
-        .iter()
-        .min_by(|a, b| nan_first(a.1.smallest_eigenvalue, b.1.smallest_eigenvalue));
+    let worst = margins.iter().min_by(|a, b| nan_first(a.1.smallest_eigenvalue, b.1.smallest_eigenvalue));
     match worst {
-        None => Claim {
-            claim,
-            verdict: Verdict::Undecided,
-            margin: f64::NAN,
-            detail: "the design has no points".into(),
-        },
+        None => {
+            Claim { claim, verdict: Verdict::Undecided, margin: f64::NAN, detail: "the design has no points".into() }
+        }
         Some((rho, block)) => Claim {
             claim,
-            verdict: if block.smallest_eigenvalue > 0.0 {
-                Verdict::Numerical
-            } else {
-                Verdict::Refuted
-            },
+            verdict: if block.smallest_eigenvalue > 0.0 { Verdict::Numerical } else { Verdict::Refuted },
             margin: block.smallest_eigenvalue,
             detail: format!(
                 "least λ_min = {:.3e} of {} blocks, in \"{}\" at parameter {rho:.4}",

@@ -1,5 +1,6 @@
-//! Does a set-point step start inside the certified set?
+//! What a design guarantees for one step of a flight.
 
+use super::Verdict;
 use crate::controller::cubic_weights;
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, quadratic_form};
@@ -7,48 +8,80 @@ use crate::plant::Scheduling;
 use crate::synthesis::Design;
 use serde::Serialize;
 
-/// A set-point step against the certified set of a design.
+/// A parameter rate up to this, per second, is rest: what the solver's accuracy, a relative 1e-6 in the gains, leaves of a
+/// heading that nothing turns.
+const REST_RATE: f64 = 1e-5;
+
+/// How a step was flown, as far as the bound asks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepConditions<'a> {
+    /// x − x_ref at its start.
+    pub error: &'a [f64],
+    /// Scheduling parameter at its start.
+    pub parameter: f64,
+    /// Largest rate of the parameter during the step, per second.
+    pub peak_parameter_rate: f64,
+    /// Whether noise acted on the plant or its measurements.
+    pub noise: bool,
+}
+
+/// A condition of the cost bound that a step does not meet.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum UnmetCondition {
+    /// It starts outside the certified set: eᵀPe > level.
+    Outside {
+        /// Level of the set.
+        level: f64,
+    },
+    /// The parameter moves, and the design is one of frozen parameters.
+    ParameterMoves {
+        /// At up to this rate, per second.
+        rate: f64,
+    },
+    /// Noise acts, of which the bound knows nothing.
+    Noise,
+}
+
+/// The cost bound of a step, and what it is worth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CertifiedStep {
-    /// eᵀP(ρ)e: the bound on the cost of the step, if it is certified.
+pub struct StepBound {
+    /// eᵀP(ρ)e: the bound on the cost of the step, if every condition is met.
     pub bound: f64,
     /// Level of the certified set; `None` where inputs are not limited and the set is everything.
     pub level: Option<f64>,
+    /// The conditions that are not met.
+    pub unmet: Vec<UnmetCondition>,
 }
 
-impl CertifiedStep {
+impl StepBound {
     /// Whether the step starts inside the certified set.
     pub fn is_inside(&self) -> bool {
-        self.level.is_none_or(|level| self.bound <= level)
+        !self.unmet.iter().any(|condition| matches!(condition, UnmetCondition::Outside { .. }))
+    }
+
+    /// `numerical` if every condition is met, else `undecided`: a bound out of its conditions says nothing.
+    pub fn verdict(&self) -> Verdict {
+        if self.unmet.is_empty() { Verdict::Numerical } else { Verdict::Undecided }
     }
 }
 
-/// The step that starts with error `error` = x − x_ref at parameter `rho`; `scheduling` is the plant's.
+/// The bound of a step flown with `design`; `scheduling` is the plant's.
 ///
 /// The level is γ for the saturated methods; for LPVQR with limited inputs it is [`unsaturated_level`]. Between grid
 /// points P is interpolated as a [`crate::controller::Schedule::Grid`] is.
-pub fn certified_step(
-    design: &Design,
-    scheduling: Option<&Scheduling>,
-    rho: f64,
-    error: &[f64],
-) -> CertifiedStep {
-    let p = lyapunov_matrix(design, scheduling, rho);
+pub fn step_bound(design: &Design, scheduling: Option<&Scheduling>, step: &StepConditions) -> StepBound {
+    let p = lyapunov_matrix(design, scheduling, step.parameter);
     let level = design.method.gamma().or_else(|| {
-        let sigma = design
-            .controller
-            .limits
-            .symmetric_bound(&design.controller.operating_input)?;
-        Some(unsaturated_level(
-            &p,
-            &design.controller.schedule.gain_matrix(rho),
-            &sigma,
-        ))
+        let sigma = design.controller.limits.symmetric_bound(&design.controller.operating_input)?;
+        Some(unsaturated_level(&p, &design.controller.schedule.gain_matrix(step.parameter), &sigma))
     });
-    CertifiedStep {
-        bound: quadratic_form(&p, error),
-        level,
-    }
+    let bound = quadratic_form(&p, step.error);
+    let outside = level.filter(|&level| bound.is_nan() || bound > level).map(|level| UnmetCondition::Outside { level });
+    let rate = step.peak_parameter_rate;
+    let moves = (rate.is_nan() || rate > REST_RATE).then_some(UnmetCondition::ParameterMoves { rate });
+    let noise = step.noise.then_some(UnmetCondition::Noise);
+    StepBound { bound, level, unmet: [outside, moves, noise].into_iter().flatten().collect() }
 }
 
 /// The largest γ such that u = −Kx does not saturate, |kᵢx| ≤ σᵢ, on xᵀPx ≤ γ: min σᵢ²/(kᵢP⁻¹kᵢᵀ) (Lemma 2.2).
@@ -66,15 +99,10 @@ pub fn unsaturated_level(p: &Mat<f64>, k: &Mat<f64>, sigma: &[f64]) -> f64 {
 /// P(ρ) of a frozen design.
 fn lyapunov_matrix(design: &Design, scheduling: Option<&Scheduling>, rho: f64) -> Mat<f64> {
     let parameters: Vec<f64> = design.points.iter().map(|point| point.rho).collect();
-    let period = scheduling
-        .filter(|s| s.periodic)
-        .map(|s| s.range[1] - s.range[0]);
+    let period = scheduling.filter(|s| s.periodic).map(|s| s.range[1] - s.range[0]);
     let n = design.points[0].p.nrows();
-    cubic_weights(&parameters, period, rho).into_iter().fold(
-        Mat::zeros(n, n),
-        |sum, (k, weight)| {
-            let p = &design.points[k].p;
-            Mat::from_fn(n, n, |i, j| sum[(i, j)] + weight * p[(i, j)])
-        },
-    )
+    cubic_weights(&parameters, period, rho).into_iter().fold(Mat::zeros(n, n), |sum, (k, weight)| {
+        let p = &design.points[k].p;
+        Mat::from_fn(n, n, |i, j| sum[(i, j)] + weight * p[(i, j)])
+    })
 }

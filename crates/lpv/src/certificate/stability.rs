@@ -39,34 +39,19 @@ pub fn frozen_stability(design: &Design, plant: &dyn Plant, count: usize) -> Sta
             }
         })
         .collect();
-    margins
-        .into_iter()
-        .reduce(worst)
-        .unwrap_or(StabilityMargin {
-            abscissa: f64::NAN,
-            abscissa_at: f64::NAN,
-            radius: f64::NAN,
-            radius_at: f64::NAN,
-        })
+    margins.into_iter().reduce(worst).unwrap_or(StabilityMargin {
+        abscissa: f64::NAN,
+        abscissa_at: f64::NAN,
+        radius: f64::NAN,
+        radius_at: f64::NAN,
+    })
 }
 
 /// The worse of two, separately for abscissa and radius; NaN is the worst.
 fn worst(a: StabilityMargin, b: StabilityMargin) -> StabilityMargin {
     let worse = |b: f64, a: f64| b.is_nan() || b > a;
-    let (abscissa, abscissa_at) = if worse(b.abscissa, a.abscissa) {
-        (b.abscissa, b.abscissa_at)
-    } else {
-        (a.abscissa, a.abscissa_at)
-    };
-    let (radius, radius_at) = if worse(b.radius, a.radius) {
-        (b.radius, b.radius_at)
-    } else {
-        (a.radius, a.radius_at)
-    };
-    StabilityMargin {
-        abscissa,
-        abscissa_at,
-        radius,
-        radius_at,
-    }
+    let (abscissa, abscissa_at) =
+        if worse(b.abscissa, a.abscissa) { (b.abscissa, b.abscissa_at) } else { (a.abscissa, a.abscissa_at) };
+    let (radius, radius_at) = if worse(b.radius, a.radius) { (b.radius, b.radius_at) } else { (a.radius, a.radius_at) };
+    StabilityMargin { abscissa, abscissa_at, radius, radius_at }
 }

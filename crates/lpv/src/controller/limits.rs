@@ -14,10 +14,7 @@ pub struct InputLimits {
 impl InputLimits {
     /// No limits on `inputs` inputs.
     pub fn none(inputs: usize) -> Self {
-        Self {
-            min: vec![None; inputs],
-            max: vec![None; inputs],
-        }
+        Self { min: vec![None; inputs], max: vec![None; inputs] }
     }
 
     /// Whether no input is limited.
@@ -63,10 +60,7 @@ mod tests {
 
     #[test]
     fn clips_and_tells() {
-        let limits = InputLimits {
-            min: vec![Some(0.0), None],
-            max: vec![Some(2.0), Some(1.0)],
-        };
+        let limits = InputLimits { min: vec![Some(0.0), None], max: vec![Some(2.0), Some(1.0)] };
         let mut input = [3.0, -5.0];
         assert!(limits.saturate(&mut input));
         assert_eq!(input, [2.0, -5.0]);
@@ -75,10 +69,7 @@ mod tests {
 
     #[test]
     fn bound_is_the_smaller_side() {
-        let limits = InputLimits {
-            min: vec![Some(0.0)],
-            max: vec![Some(10.0)],
-        };
+        let limits = InputLimits { min: vec![Some(0.0)], max: vec![Some(10.0)] };
         assert_eq!(limits.symmetric_bound(&[4.0]), Some(vec![4.0]));
         assert_eq!(InputLimits::none(1).symmetric_bound(&[4.0]), None);
     }

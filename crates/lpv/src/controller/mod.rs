@@ -34,10 +34,7 @@ pub struct Law<'a> {
 impl<'a> Law<'a> {
     /// The control law of `controller` for `states` state components.
     pub fn new(controller: &'a Controller, states: usize) -> Self {
-        Self {
-            controller,
-            gain: vec![0.0; controller.operating_input.len() * states],
-        }
+        Self { controller, gain: vec![0.0; controller.operating_input.len() * states] }
     }
 
     /// The input u = u* − sat(K(ρ) e) for the error e = x − x_ref at parameter ρ; true if an input was limited.

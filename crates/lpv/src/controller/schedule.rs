@@ -41,11 +41,7 @@ impl Schedule {
         gain.fill(0.0);
         match self {
             Schedule::Constant { gain: k } => add_scaled(gain, 1.0, k),
-            Schedule::Grid {
-                parameters,
-                period,
-                gains,
-            } => {
+            Schedule::Grid { parameters, period, gains } => {
                 for (k, weight) in cubic_weights(parameters, *period, rho) {
                     add_scaled(gain, weight, &gains[k]);
                 }
@@ -84,11 +80,7 @@ fn add_scaled(sum: &mut [f64], factor: f64, matrix: &Mat<f64>) {
 ///
 /// A periodic grid wraps; otherwise `rho` is clamped to the grid and the window moved inside it. Grids of fewer than four
 /// points use all of them.
-pub(crate) fn cubic_weights(
-    parameters: &[f64],
-    period: Option<f64>,
-    rho: f64,
-) -> Vec<(usize, f64)> {
+pub(crate) fn cubic_weights(parameters: &[f64], period: Option<f64>, rho: f64) -> Vec<(usize, f64)> {
     let count = parameters.len();
     if count == 1 {
         return vec![(0, 1.0)];
@@ -99,31 +91,20 @@ pub(crate) fn cubic_weights(
     let (position, first) = match period {
         Some(period) => {
             let position = (rho - parameters[0]).rem_euclid(period) / step;
-            (
-                position,
-                position.floor() as isize - (width as isize - 1) / 2,
-            )
+            (position, position.floor() as isize - (width as isize - 1) / 2)
         }
         None => {
             let position = ((rho - parameters[0]) / step).clamp(0.0, (count - 1) as f64);
-            (
-                position,
-                (position.floor() as isize - (width as isize - 1) / 2)
-                    .clamp(0, (count - width) as isize),
-            )
+            (position, (position.floor() as isize - (width as isize - 1) / 2).clamp(0, (count - width) as isize))
         }
     };
     (0..width)
         .map(|i| {
             let node = (first + i as isize) as f64;
             let weight = (0..width).filter(|&j| j != i).fold(1.0, |product, j| {
-                product * (position - (first + j as isize) as f64)
-                    / (node - (first + j as isize) as f64)
+                product * (position - (first + j as isize) as f64) / (node - (first + j as isize) as f64)
             });
-            (
-                (first + i as isize).rem_euclid(count as isize) as usize,
-                weight,
-            )
+            ((first + i as isize).rem_euclid(count as isize) as usize, weight)
         })
         .collect()
 }
@@ -134,16 +115,11 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     fn periodic_error(count: usize) -> f64 {
-        let grid: Vec<f64> = (0..count)
-            .map(|k| -PI + TAU * k as f64 / count as f64)
-            .collect();
+        let grid: Vec<f64> = (0..count).map(|k| -PI + TAU * k as f64 / count as f64).collect();
         (0..1000)
             .map(|k| {
                 let rho = -4.0 + 0.009 * k as f64;
-                let value: f64 = cubic_weights(&grid, Some(TAU), rho)
-                    .iter()
-                    .map(|&(k, w)| w * grid[k].sin())
-                    .sum();
+                let value: f64 = cubic_weights(&grid, Some(TAU), rho).iter().map(|&(k, w)| w * grid[k].sin()).sum();
                 (value - rho.sin()).abs()
             })
             .fold(0.0, f64::max)
@@ -160,12 +136,7 @@ mod tests {
     fn cubics_are_exact_up_to_the_ends_and_constant_beyond() {
         let grid: Vec<f64> = (0..7).map(|k| 0.5 * k as f64).collect();
         let cubic = |x: f64| 1.0 - 2.0 * x + 0.3 * x.powi(3);
-        let value = |rho: f64| {
-            cubic_weights(&grid, None, rho)
-                .iter()
-                .map(|&(k, w)| w * cubic(grid[k]))
-                .sum::<f64>()
-        };
+        let value = |rho: f64| cubic_weights(&grid, None, rho).iter().map(|&(k, w)| w * cubic(grid[k])).sum::<f64>();
         for rho in [0.0, 0.1, 1.3, 2.9, 3.0] {
             assert!((value(rho) - cubic(rho)).abs() < 1e-12);
         }

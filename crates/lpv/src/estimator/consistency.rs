@@ -27,13 +27,7 @@ pub struct ConsistencyStatistics {
 impl ConsistencyStatistics {
     /// No samples yet, for `states` states.
     pub fn new(states: usize) -> Self {
-        Self {
-            inside: vec![0; states],
-            squares: vec![0.0; states],
-            samples: 0,
-            nees_sum: 0.0,
-            nees_samples: 0,
-        }
+        Self { inside: vec![0; states], squares: vec![0.0; states], samples: 0, nees_sum: 0.0, nees_samples: 0 }
     }
 
     /// Add a sample: the estimation error and the filter's covariance in row order.
@@ -55,16 +49,8 @@ impl ConsistencyStatistics {
     pub fn result(&self) -> Consistency {
         let count = self.samples as f64;
         Consistency {
-            inside_three_sigma: self
-                .inside
-                .iter()
-                .map(|&inside| inside as f64 / count)
-                .collect(),
-            rms_error: self
-                .squares
-                .iter()
-                .map(|sum| (sum / count).sqrt())
-                .collect(),
+            inside_three_sigma: self.inside.iter().map(|&inside| inside as f64 / count).collect(),
+            rms_error: self.squares.iter().map(|sum| (sum / count).sqrt()).collect(),
             nees: self.nees_sum / self.nees_samples as f64,
         }
     }

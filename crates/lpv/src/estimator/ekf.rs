@@ -43,18 +43,11 @@ impl<'a> Ekf<'a> {
     /// The filter for `plant` with the noise `covariance` at sample time `sample_time_s`.
     pub fn new(plant: &'a dyn Plant, covariance: &NoiseCovariance, sample_time_s: f64) -> Self {
         let description = plant.description();
-        let (n, nw, ny) = (
-            description.states.len(),
-            description.disturbances.len(),
-            description.outputs.len(),
-        );
+        let (n, nw, ny) = (description.states.len(), description.disturbances.len(), description.outputs.len());
         let r = &covariance.measurement;
         Self {
             plant,
-            q_c: to_row_vec(&covariance.process)
-                .iter()
-                .map(|entry| entry / sample_time_s)
-                .collect(),
+            q_c: to_row_vec(&covariance.process).iter().map(|entry| entry / sample_time_s).collect(),
             r_c: Mat::from_fn(ny, ny, |i, j| r[(i, j)] * sample_time_s),
             work: Work {
                 a: vec![0.0; n * n],
@@ -74,71 +67,43 @@ impl<'a> Ekf<'a> {
     }
 
     /// (dx̂/dt, dP/dt) at estimate `x` and covariance `p` (row order) for input `u` and measurement `y`.
-    pub fn derivative(
-        &mut self,
-        x: &[f64],
-        p: &[f64],
-        u: &[f64],
-        y: &[f64],
-        dx: &mut [f64],
-        dp: &mut [f64],
-    ) {
+    pub fn derivative(&mut self, x: &[f64], p: &[f64], u: &[f64], y: &[f64], dx: &mut [f64], dp: &mut [f64]) {
         let work = &mut self.work;
         let (n, nw, ny) = (x.len(), work.no_disturbance.len(), y.len());
-        self.plant
-            .dynamics_by_state(x, u, &work.no_disturbance, &mut work.a);
-        self.plant
-            .dynamics_by_disturbance(x, u, &work.no_disturbance, &mut work.l);
-        self.plant
-            .measurement_by_state(x, &work.no_noise, &mut work.c);
-        self.plant
-            .measurement_by_noise(x, &work.no_noise, &mut work.m);
+        self.plant.dynamics_by_state(x, u, &work.no_disturbance, &mut work.a);
+        self.plant.dynamics_by_disturbance(x, u, &work.no_disturbance, &mut work.l);
+        self.plant.measurement_by_state(x, &work.no_noise, &mut work.c);
+        self.plant.measurement_by_noise(x, &work.no_noise, &mut work.m);
 
         if work.r_inverse.as_ref().is_none_or(|(m, _)| *m != work.m) {
             let m = from_row_slice(ny, ny, &work.m);
             let r = &m * &self.r_c * m.transpose();
-            let inverse = inverse_spd(&r)
-                .map_or_else(|| vec![f64::NAN; ny * ny], |inverse| to_row_vec(&inverse));
+            let inverse = inverse_spd(&r).map_or_else(|| vec![f64::NAN; ny * ny], |inverse| to_row_vec(&inverse));
             work.r_inverse = Some((work.m.clone(), inverse));
         }
-        let r_inverse = work
-            .r_inverse
-            .as_ref()
-            .map_or(&[][..], |(_, inverse)| inverse);
+        let r_inverse = work.r_inverse.as_ref().map_or(&[][..], |(_, inverse)| inverse);
 
         multiply(&work.a, p, n, &mut work.ap);
         multiply(&work.c, p, n, &mut work.cp);
         // K = (C P)ᵀ R̃⁻¹, for P = Pᵀ
         for i in 0..n {
             for j in 0..ny {
-                work.gain[i * ny + j] = (0..ny)
-                    .map(|k| work.cp[k * n + i] * r_inverse[k * ny + j])
-                    .sum();
+                work.gain[i * ny + j] = (0..ny).map(|k| work.cp[k * n + i] * r_inverse[k * ny + j]).sum();
             }
         }
         multiply(&work.l, &self.q_c, nw, &mut work.lq);
         for i in 0..n {
             for j in 0..=i {
-                let noise: f64 = (0..nw)
-                    .map(|k| work.lq[i * nw + k] * work.l[j * nw + k])
-                    .sum();
-                let correction: f64 = (0..ny)
-                    .map(|k| work.gain[i * ny + k] * work.cp[k * n + j])
-                    .sum();
+                let noise: f64 = (0..nw).map(|k| work.lq[i * nw + k] * work.l[j * nw + k]).sum();
+                let correction: f64 = (0..ny).map(|k| work.gain[i * ny + k] * work.cp[k * n + j]).sum();
                 let entry = work.ap[i * n + j] + work.ap[j * n + i] + noise - correction;
                 dp[i * n + j] = entry;
                 dp[j * n + i] = entry;
             }
         }
 
-        self.plant
-            .measurement(x, &work.no_noise, &mut work.innovation);
-        for ((innovation, y), signal) in work
-            .innovation
-            .iter_mut()
-            .zip(y)
-            .zip(&self.plant.description().outputs)
-        {
+        self.plant.measurement(x, &work.no_noise, &mut work.innovation);
+        for ((innovation, y), signal) in work.innovation.iter_mut().zip(y).zip(&self.plant.description().outputs) {
             *innovation = y - *innovation;
             if signal.wraps {
                 *innovation = wrap(*innovation);
@@ -146,9 +111,7 @@ impl<'a> Ekf<'a> {
         }
         self.plant.dynamics(x, u, &work.no_disturbance, dx);
         for (i, rate) in dx.iter_mut().enumerate() {
-            *rate += (0..ny)
-                .map(|j| work.gain[i * ny + j] * work.innovation[j])
-                .sum::<f64>();
+            *rate += (0..ny).map(|j| work.gain[i * ny + j] * work.innovation[j]).sum::<f64>();
         }
     }
 }
@@ -158,10 +121,7 @@ impl<'a> Ekf<'a> {
 fn multiply(left: &[f64], right: &[f64], inner: usize, product: &mut [f64]) {
     let columns = right.len() / inner;
     product.fill(0.0);
-    for (row, out) in left
-        .chunks_exact(inner)
-        .zip(product.chunks_exact_mut(columns))
-    {
+    for (row, out) in left.chunks_exact(inner).zip(product.chunks_exact_mut(columns)) {
         for (&factor, source) in row.iter().zip(right.chunks_exact(columns)) {
             if factor != 0.0 {
                 for (sum, value) in out.iter_mut().zip(source) {

@@ -9,11 +9,7 @@ use std::f64::consts::{PI, TAU};
 pub fn wrap(angle_rad: f64) -> f64 {
     let wrapped = (angle_rad + PI).rem_euclid(TAU) - PI;
     // rem_euclid may round up to TAU itself
-    if wrapped >= PI {
-        wrapped - TAU
-    } else {
-        wrapped
-    }
+    if wrapped >= PI { wrapped - TAU } else { wrapped }
 }
 
 #[cfg(test)]

@@ -6,53 +6,35 @@ use faer::{Side, c64};
 /// The eigenvalues of a symmetric matrix in ascending order (the lower triangle is read).
 /// A matrix with a non-finite entry has none: the result holds NaN.
 pub fn symmetric_eigenvalues(matrix: &Mat<f64>) -> Vec<f64> {
-    matrix
-        .self_adjoint_eigenvalues(Side::Lower)
-        .unwrap_or_else(|_| vec![f64::NAN; matrix.nrows()])
+    matrix.self_adjoint_eigenvalues(Side::Lower).unwrap_or_else(|_| vec![f64::NAN; matrix.nrows()])
 }
 
 /// λ_min of a symmetric matrix.
 pub fn smallest_eigenvalue(matrix: &Mat<f64>) -> f64 {
-    symmetric_eigenvalues(matrix)
-        .first()
-        .copied()
-        .unwrap_or(f64::NAN)
+    symmetric_eigenvalues(matrix).first().copied().unwrap_or(f64::NAN)
 }
 
 /// The eigenvalues (re, im) of a real square matrix, in no particular order.
 pub fn eigenvalues(matrix: &Mat<f64>) -> Vec<(f64, f64)> {
     match matrix.eigenvalues() {
-        Ok(values) => values
-            .into_iter()
-            .map(|value: c64| (value.re, value.im))
-            .collect(),
+        Ok(values) => values.into_iter().map(|value: c64| (value.re, value.im)).collect(),
         Err(_) => vec![(f64::NAN, f64::NAN); matrix.nrows()],
     }
 }
 
 /// max Re λ(M): negative exactly when ẋ = Mx is asymptotically stable.
 pub fn spectral_abscissa(matrix: &Mat<f64>) -> f64 {
-    eigenvalues(matrix)
-        .into_iter()
-        .map(|(re, _)| re)
-        .fold(f64::NEG_INFINITY, nan_max)
+    eigenvalues(matrix).into_iter().map(|(re, _)| re).fold(f64::NEG_INFINITY, nan_max)
 }
 
 /// max |λ(M)|: below one exactly when x₊ = Mx is asymptotically stable.
 pub fn spectral_radius(matrix: &Mat<f64>) -> f64 {
-    eigenvalues(matrix)
-        .into_iter()
-        .map(|(re, im)| re.hypot(im))
-        .fold(0.0, nan_max)
+    eigenvalues(matrix).into_iter().map(|(re, im)| re.hypot(im)).fold(0.0, nan_max)
 }
 
 /// The larger of two numbers, NaN if either is: an eigenvalue that could not be computed must not pass for stable.
 fn nan_max(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() {
-        f64::NAN
-    } else {
-        a.max(b)
-    }
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
 /// The first eigenvalue λ of A with Re λ ≥ 0 that the input cannot move: rank [A − λI, B] < n
@@ -64,16 +46,10 @@ pub fn unstabilizable_mode(a: &Mat<f64>, b: &Mat<f64>) -> Option<(f64, f64)> {
         // eigenvalues of a defective matrix are exact only to the root of the rounding unit
         let pencil = Mat::from_fn(n, n + m, |i, j| {
             let entry = if j < n { a[(i, j)] } else { b[(i, j - n)] };
-            if i == j {
-                c64::new(entry - re, -im)
-            } else {
-                c64::new(entry, 0.0)
-            }
+            if i == j { c64::new(entry - re, -im) } else { c64::new(entry, 0.0) }
         });
         re >= -1e-9 * scale
-            && pencil.singular_values().map_or(true, |values| {
-                values.last().is_none_or(|&least| least <= 1e-10 * scale)
-            })
+            && pencil.singular_values().map_or(true, |values| values.last().is_none_or(|&least| least <= 1e-10 * scale))
     })
 }
 
@@ -88,11 +64,7 @@ mod tests {
         let b = from_rows(&[vec![1.0], vec![0.0]]);
         assert_eq!(unstabilizable_mode(&a, &b), Some((2.0, 0.0)));
         let b = from_rows(&[vec![0.0], vec![1.0]]);
-        assert_eq!(
-            unstabilizable_mode(&a, &b),
-            None,
-            "the uncontrolled mode is stable"
-        );
+        assert_eq!(unstabilizable_mode(&a, &b), None, "the uncontrolled mode is stable");
     }
 
     #[test]

@@ -14,10 +14,7 @@ pub fn discretize(a: &Mat<f64>, b: &Mat<f64>, sample_time_s: f64) -> (Mat<f64>, 
         _ => 0.0,
     });
     let e = exponential(&augmented);
-    (
-        e.submatrix(0, 0, n, n).to_owned(),
-        e.submatrix(0, n, n, m).to_owned(),
-    )
+    (e.submatrix(0, 0, n, n).to_owned(), e.submatrix(0, n, n, m).to_owned())
 }
 
 /// e^M by scaling and squaring with the diagonal [6/6] Padé approximant (Higham 2005).

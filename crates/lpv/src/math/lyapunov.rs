@@ -20,13 +20,9 @@ pub fn solve(a: &Mat<f64>, q: &Mat<f64>) -> Option<Mat<f64>> {
             return None;
         }
         let scale = (z_inverse.norm_l2() / z.norm_l2()).sqrt();
-        let z_next = Mat::from_fn(n, n, |i, j| {
-            0.5 * (scale * z[(i, j)] + z_inverse[(i, j)] / scale)
-        });
+        let z_next = Mat::from_fn(n, n, |i, j| 0.5 * (scale * z[(i, j)] + z_inverse[(i, j)] / scale));
         let congruence = z_inverse.transpose() * &w * &z_inverse;
-        w = Mat::from_fn(n, n, |i, j| {
-            0.5 * (scale * w[(i, j)] + congruence[(i, j)] / scale)
-        });
+        w = Mat::from_fn(n, n, |i, j| 0.5 * (scale * w[(i, j)] + congruence[(i, j)] / scale));
         let change = (&z_next - &z).norm_l2();
         z = z_next;
         if change <= 1e-14 * z.norm_l2() * n as f64 {

@@ -7,41 +7,28 @@ use faer::{MatRef, Side};
 
 /// Matrix from its rows. All rows must have the same length.
 pub fn from_rows(rows: &[Vec<f64>]) -> Mat<f64> {
-    Mat::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |i, j| {
-        rows[i][j]
-    })
+    Mat::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |i, j| rows[i][j])
 }
 
 /// Matrix from `rows` × `cols` entries in row order.
 pub fn from_row_slice(rows: usize, cols: usize, entries: &[f64]) -> Mat<f64> {
-    assert_eq!(
-        entries.len(),
-        rows * cols,
-        "a {rows} × {cols} matrix needs {} entries",
-        rows * cols
-    );
+    assert_eq!(entries.len(), rows * cols, "a {rows} × {cols} matrix needs {} entries", rows * cols);
     Mat::from_fn(rows, cols, |i, j| entries[i * cols + j])
 }
 
 /// The rows of a matrix.
 pub fn to_rows(matrix: &Mat<f64>) -> Vec<Vec<f64>> {
-    (0..matrix.nrows())
-        .map(|i| (0..matrix.ncols()).map(|j| matrix[(i, j)]).collect())
-        .collect()
+    (0..matrix.nrows()).map(|i| (0..matrix.ncols()).map(|j| matrix[(i, j)]).collect()).collect()
 }
 
 /// The entries of a matrix in row order.
 pub fn to_row_vec(matrix: &Mat<f64>) -> Vec<f64> {
-    (0..matrix.nrows())
-        .flat_map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)]))
-        .collect()
+    (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| matrix[(i, j)])).collect()
 }
 
 /// Diagonal matrix.
 pub fn diagonal(entries: &[f64]) -> Mat<f64> {
-    Mat::from_fn(entries.len(), entries.len(), |i, j| {
-        if i == j { entries[i] } else { 0.0 }
-    })
+    Mat::from_fn(entries.len(), entries.len(), |i, j| if i == j { entries[i] } else { 0.0 })
 }
 
 /// Identity matrix of size `n`.
@@ -56,16 +43,13 @@ pub fn trace(matrix: &Mat<f64>) -> f64 {
 
 /// (X + Xᵀ)/2, exactly symmetric.
 pub fn symmetric_part(matrix: &Mat<f64>) -> Mat<f64> {
-    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
-        0.5 * (matrix[(i, j)] + matrix[(j, i)])
-    })
+    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)]))
 }
 
 /// Whether X = Xᵀ to the relative tolerance `tolerance`.
 pub fn is_symmetric(matrix: &Mat<f64>, tolerance: f64) -> bool {
     matrix.nrows() == matrix.ncols()
-        && (matrix - matrix.transpose()).norm_max()
-            <= tolerance * matrix.norm_max().max(f64::MIN_POSITIVE)
+        && (matrix - matrix.transpose()).norm_max() <= tolerance * matrix.norm_max().max(f64::MIN_POSITIVE)
 }
 
 /// Whether every entry is finite.
@@ -111,13 +95,7 @@ pub fn solve(m: &Mat<f64>, n: &Mat<f64>) -> Mat<f64> {
 
 /// xᵀ M x
 pub fn quadratic_form(matrix: &Mat<f64>, x: &[f64]) -> f64 {
-    (0..matrix.nrows())
-        .map(|i| {
-            x[i] * (0..matrix.ncols())
-                .map(|j| matrix[(i, j)] * x[j])
-                .sum::<f64>()
-        })
-        .sum()
+    (0..matrix.nrows()).map(|i| x[i] * (0..matrix.ncols()).map(|j| matrix[(i, j)] * x[j]).sum::<f64>()).sum()
 }
 
 /// [[a, b], [c, d]] from four blocks of matching sizes.
@@ -165,21 +143,13 @@ pub mod rows_list {
     struct Rows(#[serde(with = "rows")] Mat<f64>);
 
     /// Write each matrix as its rows.
-    pub fn serialize<S: Serializer>(
-        matrices: &[Mat<f64>],
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
+    pub fn serialize<S: Serializer>(matrices: &[Mat<f64>], serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(matrices.iter().map(|matrix| Rows(matrix.clone())))
     }
 
     /// Read each matrix from its rows.
-    pub fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Vec<Mat<f64>>, D::Error> {
-        Ok(Vec::<Rows>::deserialize(deserializer)?
-            .into_iter()
-            .map(|Rows(matrix)| matrix)
-            .collect())
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Mat<f64>>, D::Error> {
+        Ok(Vec::<Rows>::deserialize(deserializer)?.into_iter().map(|Rows(matrix)| matrix).collect())
     }
 }
 
@@ -192,17 +162,12 @@ pub mod rows_option {
     struct Rows(#[serde(with = "rows")] Mat<f64>);
 
     /// Write the rows, or null.
-    pub fn serialize<S: Serializer>(
-        matrix: &Option<Mat<f64>>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
+    pub fn serialize<S: Serializer>(matrix: &Option<Mat<f64>>, serializer: S) -> Result<S::Ok, S::Error> {
         matrix.clone().map(Rows).serialize(serializer)
     }
 
     /// Read the rows, or null.
-    pub fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Mat<f64>>, D::Error> {
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Mat<f64>>, D::Error> {
         Ok(Option::<Rows>::deserialize(deserializer)?.map(|Rows(matrix)| matrix))
     }
 }

@@ -1,8 +1,6 @@
 //! The continuous algebraic Riccati equation Aᵀ P + P A − P B R⁻¹ Bᵀ P + Q = 0, thesis (2.31).
 
-use super::matrix::{
-    blocks_2x2, identity, inverse, inverse_spd, is_finite, least_squares, symmetric_part,
-};
+use super::matrix::{blocks_2x2, identity, inverse, inverse_spd, is_finite, least_squares, symmetric_part};
 use super::{Mat, eigen, lyapunov};
 
 /// The stabilising solution of the Riccati equation and the gain that it gives.
@@ -28,11 +26,17 @@ pub enum RiccatiError {
         /// Imaginary part of the eigenvalue.
         im: f64,
     },
-    /// The Hamiltonian matrix has eigenvalues on the imaginary axis.
+    /// The Hamiltonian matrix has eigenvalues on the imaginary axis, or too close to it for its arithmetic.
     #[error(
-        "the Hamiltonian matrix has eigenvalues on the imaginary axis: (Q, A) has an undetectable mode there; weigh it in Q"
+        "the Hamiltonian matrix has eigenvalues on the imaginary axis, to rounding: a mode of A there costs nothing (weigh it \
+         in Q), or the problem is too badly conditioned"
     )]
     ImaginaryAxis,
+    /// The solution that was found does not stabilise, after rounding.
+    #[error(
+        "the Riccati equation is too badly conditioned: its solution does not stabilise after rounding; scale states and inputs"
+    )]
+    IllConditioned,
 }
 
 /// Solve the Riccati equation for A (n × n), B (n × m), Q = Qᵀ ⪰ 0, R = Rᵀ ≻ 0.
@@ -42,12 +46,7 @@ pub enum RiccatiError {
 ///
 /// # Errors
 /// See [`RiccatiError`].
-pub fn solve(
-    a: &Mat<f64>,
-    b: &Mat<f64>,
-    q: &Mat<f64>,
-    r: &Mat<f64>,
-) -> Result<Regulator, RiccatiError> {
+pub fn solve(a: &Mat<f64>, b: &Mat<f64>, q: &Mat<f64>, r: &Mat<f64>) -> Result<Regulator, RiccatiError> {
     let n = a.nrows();
     let r_inverse = inverse_spd(r).ok_or(RiccatiError::InputWeight)?;
     if let Some((re, im)) = eigen::unstabilizable_mode(a, b) {
@@ -56,21 +55,12 @@ pub fn solve(
     let g = b * &r_inverse * b.transpose();
     let minus = |m: &Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| -m[(i, j)]);
     let minus_a_transposed = minus(&a.transpose().to_owned());
-    let hamiltonian = blocks_2x2(
-        a.as_ref(),
-        minus(&g).as_ref(),
-        minus(q).as_ref(),
-        minus_a_transposed.as_ref(),
-    );
+    let hamiltonian = blocks_2x2(a.as_ref(), minus(&g).as_ref(), minus(q).as_ref(), minus_a_transposed.as_ref());
     let sign = matrix_sign(hamiltonian).ok_or(RiccatiError::ImaginaryAxis)?;
 
     // (sign + I)[I; P] = 0: 2n × n equations for P
-    let left = Mat::from_fn(2 * n, n, |i, j| {
-        sign[(i, n + j)] + if i == n + j { 1.0 } else { 0.0 }
-    });
-    let right = Mat::from_fn(2 * n, n, |i, j| {
-        -sign[(i, j)] - if i == j { 1.0 } else { 0.0 }
-    });
+    let left = Mat::from_fn(2 * n, n, |i, j| sign[(i, n + j)] + if i == n + j { 1.0 } else { 0.0 });
+    let right = Mat::from_fn(2 * n, n, |i, j| -sign[(i, j)] - if i == j { 1.0 } else { 0.0 });
     let mut p = symmetric_part(&least_squares(&left, &right).ok_or(RiccatiError::ImaginaryAxis)?);
 
     for _ in 0..3 {
@@ -78,7 +68,7 @@ pub fn solve(
         let cost = q + &p * &g * &p;
         match lyapunov::solve(&closed_loop, &cost) {
             Some(next) => p = next,
-            None => return Err(RiccatiError::ImaginaryAxis),
+            None => return Err(RiccatiError::IllConditioned),
         }
     }
     let k = r_inverse * b.transpose() * &p;
@@ -89,21 +79,23 @@ pub fn solve(
 /// eigenvalue lies on the imaginary axis.
 fn matrix_sign(mut s: Mat<f64>) -> Option<Mat<f64>> {
     let size = s.nrows();
+    let mut last_change = f64::INFINITY;
     for _ in 0..100 {
         let s_inverse = inverse(&s);
         if !is_finite(&s_inverse) {
             return None;
         }
-        let scale = (s_inverse.norm_l2() / s.norm_l2()).sqrt();
-        let next = Mat::from_fn(size, size, |i, j| {
-            0.5 * (scale * s[(i, j)] + s_inverse[(i, j)] / scale)
-        });
-        let change = (&next - &s).norm_l2();
+        // scaling speeds up the start; near convergence it is one up to rounding, and would only keep rounding alive
+        let scale = if last_change < 1e-2 { 1.0 } else { (s_inverse.norm_l2() / s.norm_l2()).sqrt() };
+        let next = Mat::from_fn(size, size, |i, j| 0.5 * (scale * s[(i, j)] + s_inverse[(i, j)] / scale));
+        let change = (&next - &s).norm_l2() / next.norm_l2();
         s = next;
-        if change <= 1e-12 * s.norm_l2() {
+        // converged, or down to rounding: quadratic convergence would have squared the change
+        if change <= 1e-13 || (change < 1e-6 && change > 0.5 * last_change) {
             let residual = &s * &s - identity(size);
             return (residual.norm_l2() <= 1e-4 * s.norm_l2().powi(2)).then_some(s);
         }
+        last_change = change;
     }
     None
 }
@@ -132,6 +124,20 @@ mod tests {
         }
     }
 
+    /// Forty states: the sign iteration ends at rounding, not at a fixed tolerance.
+    #[test]
+    fn large_random_system() {
+        let mut state = 1u64;
+        let mut draw = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as f64 / (1u64 << 30) as f64 - 1.0
+        };
+        let a = Mat::from_fn(40, 40, |_, _| draw());
+        let b = Mat::from_fn(40, 20, |_, _| draw());
+        let regulator = solve(&a, &b, &identity(40), &identity(20)).unwrap();
+        assert!(residual(&a, &b, &identity(40), &identity(20), &regulator.p) < 1e-9);
+    }
+
     /// Double integrator, Q = I, R = r: K = [1, √(1 + 2√r)]/√r in closed form (thesis (5.6); corrected digits).
     #[test]
     fn double_integrator_in_closed_form() {
@@ -148,9 +154,6 @@ mod tests {
         let b = from_rows(&[vec![0.0], vec![1.0]]);
         let error = solve(&a, &b, &identity(2), &identity(1)).unwrap_err();
         assert_eq!(error, RiccatiError::Unstabilizable { re: 1.0, im: 0.0 });
-        assert_eq!(
-            solve(&a, &b, &identity(2), &diagonal(&[-1.0])).unwrap_err(),
-            RiccatiError::InputWeight
-        );
+        assert_eq!(solve(&a, &b, &identity(2), &diagonal(&[-1.0])).unwrap_err(), RiccatiError::InputWeight);
     }
 }

@@ -25,20 +25,11 @@ pub fn linearize(plant: &dyn Plant, rho: f64) -> FrozenModel {
     let description = plant.description();
     let (n, m) = (description.states.len(), description.inputs.len());
     let operating_point = plant.trim(rho);
-    let (x, u, w) = (
-        &operating_point.state,
-        &operating_point.input,
-        vec![0.0; description.disturbances.len()],
-    );
+    let (x, u, w) = (&operating_point.state, &operating_point.input, vec![0.0; description.disturbances.len()]);
     let (mut a, mut b) = (vec![0.0; n * n], vec![0.0; n * m]);
     plant.dynamics_by_state(x, u, &w, &mut a);
     plant.dynamics_by_input(x, u, &w, &mut b);
-    FrozenModel {
-        rho,
-        a: from_row_slice(n, n, &a),
-        b: from_row_slice(n, m, &b),
-        operating_point,
-    }
+    FrozenModel { rho, a: from_row_slice(n, n, &a), b: from_row_slice(n, m, &b), operating_point }
 }
 
 /// Linearisations over a grid of the scheduling parameter; one point for a plant without a parameter.
@@ -54,10 +45,7 @@ impl GridModel {
     /// `count` equidistant points over the range of the plant's parameter. A periodic range does not repeat its end.
     pub fn of_plant(plant: &dyn Plant, count: usize) -> Self {
         let scheduling = plant.description().scheduling.clone();
-        let points = parameter_grid(scheduling.as_ref(), count)
-            .into_iter()
-            .map(|rho| linearize(plant, rho))
-            .collect();
+        let points = parameter_grid(scheduling.as_ref(), count).into_iter().map(|rho| linearize(plant, rho)).collect();
         Self { scheduling, points }
     }
 }
@@ -65,20 +53,9 @@ impl GridModel {
 /// `count` equidistant values over the range of a parameter, without the repeated end of a periodic one; `[0]` where
 /// there is no parameter.
 pub fn parameter_grid(scheduling: Option<&Scheduling>, count: usize) -> Vec<f64> {
-    let Some(Scheduling {
-        range: [low, high],
-        periodic,
-        ..
-    }) = scheduling
-    else {
+    let Some(Scheduling { range: [low, high], periodic, .. }) = scheduling else {
         return vec![0.0];
     };
-    let intervals = if *periodic {
-        count
-    } else {
-        count.saturating_sub(1).max(1)
-    };
-    (0..count)
-        .map(|k| low + (high - low) * k as f64 / intervals as f64)
-        .collect()
+    let intervals = if *periodic { count } else { count.saturating_sub(1).max(1) };
+    (0..count).map(|k| low + (high - low) * k as f64 / intervals as f64).collect()
 }

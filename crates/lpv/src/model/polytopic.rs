@@ -24,33 +24,15 @@ impl BoxWeights {
     pub fn new(features: &[Feature]) -> Self {
         let k = features.len();
         let sign = |bit: bool| if bit { 1.0 } else { -1.0 };
-        let corners = (0..1usize << k)
-            .map(|i| {
-                (0..k)
-                    .map(|j| sign((i >> (k - 1 - j) & 1 == 1) != (j == 0)))
-                    .collect()
-            })
-            .collect();
-        Self {
-            features: features.to_vec(),
-            corners,
-        }
+        let corners =
+            (0..1usize << k).map(|i| (0..k).map(|j| sign((i >> (k - 1 - j) & 1 == 1) != (j == 0))).collect()).collect();
+        Self { features: features.to_vec(), corners }
     }
 
     /// The weights at parameter `rho`.
     pub fn at(&self, rho: f64) -> Vec<f64> {
-        let features: Vec<f64> = self
-            .features
-            .iter()
-            .map(|feature| feature.value(rho))
-            .collect();
-        let weight = |corner: &Vec<f64>| {
-            corner
-                .iter()
-                .zip(&features)
-                .map(|(c, f)| (1.0 + c * f) / 2.0)
-                .product()
-        };
+        let features: Vec<f64> = self.features.iter().map(|feature| feature.value(rho)).collect();
+        let weight = |corner: &Vec<f64>| corner.iter().zip(&features).map(|(c, f)| (1.0 + c * f) / 2.0).product();
         self.corners.iter().map(weight).collect()
     }
 
@@ -61,14 +43,11 @@ impl BoxWeights {
         let (rows, cols) = (samples[0].nrows(), samples[0].ncols());
         let weights: Vec<Vec<f64>> = parameters.iter().map(|&rho| self.at(rho)).collect();
         let design = Mat::from_fn(samples.len(), self.corners.len(), |k, i| weights[k][i]);
-        let stacked = Mat::from_fn(samples.len(), rows * cols, |k, e| {
-            samples[k][(e / cols, e % cols)]
-        });
+        let stacked = Mat::from_fn(samples.len(), rows * cols, |k, e| samples[k][(e / cols, e % cols)]);
         let unsolved = || Mat::from_fn(self.corners.len(), rows * cols, |_, _| f64::NAN);
         let solution = least_squares(&design, &stacked).unwrap_or_else(unsolved);
         let error = (&design * &solution - &stacked).norm_max();
-        let vertices = (0..self.corners.len())
-            .map(|i| Mat::from_fn(rows, cols, |r, c| solution[(i, r * cols + c)]));
+        let vertices = (0..self.corners.len()).map(|i| Mat::from_fn(rows, cols, |r, c| solution[(i, r * cols + c)]));
         (vertices.collect(), error)
     }
 }
@@ -95,22 +74,10 @@ impl PolytopicModel {
         let weights = BoxWeights::new(&scheduling.features);
         let grid = GridModel::of_plant(plant, 4 * weights.corners.len());
         let parameters: Vec<f64> = grid.points.iter().map(|point| point.rho).collect();
-        let (a, a_error) = weights.fit(
-            &parameters,
-            &grid.points.iter().map(|point| &point.a).collect::<Vec<_>>(),
-        );
+        let (a, a_error) = weights.fit(&parameters, &grid.points.iter().map(|point| &point.a).collect::<Vec<_>>());
         let b = linearize(plant, parameters[0]).b;
-        let b_error = grid
-            .points
-            .iter()
-            .map(|point| (&point.b - &b).norm_max())
-            .fold(0.0, f64::max);
-        (b_error == 0.0).then_some(Self {
-            weights,
-            a,
-            b,
-            error: a_error,
-        })
+        let b_error = grid.points.iter().map(|point| (&point.b - &b).norm_max()).fold(0.0, f64::max);
+        (b_error == 0.0).then_some(Self { weights, a, b, error: a_error })
     }
 }
 
@@ -122,21 +89,12 @@ mod tests {
     /// a₁ … a₄ of thesis 3.3 stand at rows φ, θ and columns p, q.
     #[test]
     fn quadrotor_vertices_are_the_thesis_ones() {
-        let model =
-            PolytopicModel::of_plant(&Quadrotor::new(QuadrotorParameters::default())).unwrap();
-        let printed = [
-            [-1., -1., 1., -1.],
-            [1., -1., 1., 1.],
-            [-1., 1., -1., -1.],
-            [1., 1., -1., 1.],
-        ];
+        let model = PolytopicModel::of_plant(&Quadrotor::new(QuadrotorParameters::default())).unwrap();
+        let printed = [[-1., -1., 1., -1.], [1., -1., 1., 1.], [-1., 1., -1., -1.], [1., 1., -1., 1.]];
         assert!(model.error < 1e-14);
         for (a, block) in model.a.iter().zip(printed) {
             let found = [a[(9, 6)], a[(9, 7)], a[(10, 6)], a[(10, 7)]];
-            assert!(
-                found.iter().zip(block).all(|(f, p)| (f - p).abs() < 1e-13),
-                "{found:?} is not {block:?}"
-            );
+            assert!(found.iter().zip(block).all(|(f, p)| (f - p).abs() < 1e-13), "{found:?} is not {block:?}");
         }
     }
 
@@ -147,19 +105,9 @@ mod tests {
         for k in 0..100 {
             let psi = -3.2 + 0.064 * k as f64;
             let (s, c) = psi.sin_cos();
-            let thesis = [
-                (1. + s) * (1. - c),
-                (1. + s) * (1. + c),
-                (1. - s) * (1. - c),
-                (1. - s) * (1. + c),
-            ];
+            let thesis = [(1. + s) * (1. - c), (1. + s) * (1. + c), (1. - s) * (1. - c), (1. - s) * (1. + c)];
             let found = weights.at(psi);
-            assert!(
-                found
-                    .iter()
-                    .zip(thesis)
-                    .all(|(f, t)| (f - t / 4.0).abs() < 1e-15 && *f >= 0.0)
-            );
+            assert!(found.iter().zip(thesis).all(|(f, t)| (f - t / 4.0).abs() < 1e-15 && *f >= 0.0));
             assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-15);
         }
     }

@@ -4,12 +4,7 @@ use super::{Description, Equations, OperatingPoint, Plant};
 use crate::math::scalar::{Dual, LANES, derivative, dual};
 
 /// The Jacobian of `function` at `point`, `rows` × `point.len()`, in row order.
-fn jacobian(
-    point: &[f64],
-    rows: usize,
-    jacobian: &mut [f64],
-    function: impl Fn(&[Dual], &mut [Dual]),
-) {
+fn jacobian(point: &[f64], rows: usize, jacobian: &mut [f64], function: impl Fn(&[Dual], &mut [Dual])) {
     let columns = point.len();
     debug_assert_eq!(jacobian.len(), rows * columns);
     let mut argument: Vec<Dual> = point.iter().map(|&value| dual(value, None)).collect();
@@ -52,9 +47,7 @@ impl<E: Equations> Plant for E {
 
     fn dynamics_by_state(&self, x: &[f64], u: &[f64], w: &[f64], a: &mut [f64]) {
         let (u, w) = (constants(u), constants(w));
-        jacobian(x, x.len(), a, |x, dx| {
-            Equations::dynamics(self, x, &u, &w, dx)
-        });
+        jacobian(x, x.len(), a, |x, dx| Equations::dynamics(self, x, &u, &w, dx));
     }
 
     fn dynamics_by_input(&self, x: &[f64], u: &[f64], w: &[f64], b: &mut [f64]) {

@@ -32,39 +32,15 @@ impl Linear {
     /// A is not square, B or C does not fit A, or an entry is not finite.
     pub fn new(parameters: &LinearParameters) -> Result<Self, PlantParameterError> {
         let n = parameters.a.len();
-        check(
-            "A",
-            &parameters.a,
-            n.max(1),
-            n,
-            "square, with at least one row",
-        )?;
+        check("A", &parameters.a, n.max(1), n, "square, with at least one row")?;
         let m = parameters.b.first().map_or(0, Vec::len).max(1);
-        check(
-            "B",
-            &parameters.b,
-            n,
-            m,
-            &format!("{n} × m, with a row for each row of A"),
-        )?;
+        check("B", &parameters.b, n, m, &format!("{n} × m, with a row for each row of A"))?;
         if let Some(c) = &parameters.c {
-            check(
-                "C",
-                c,
-                c.len().max(1),
-                n,
-                &format!("p × {n}, with a column for each state"),
-            )?;
+            check("C", c, c.len().max(1), n, &format!("p × {n}, with a column for each state"))?;
         }
         let outputs = parameters.c.as_ref().map_or(n, Vec::len);
         let list = |symbol: &str, count: usize| {
-            (1..=count)
-                .map(|i| Signal {
-                    name: format!("{symbol}_{i}"),
-                    unit: "-".into(),
-                    wraps: false,
-                })
-                .collect()
+            (1..=count).map(|i| Signal { name: format!("{symbol}_{i}"), unit: "-".into(), wraps: false }).collect()
         };
         let description = Description {
             name: "linear".into(),
@@ -76,10 +52,7 @@ impl Linear {
             state_limits: vec![None; n],
             scene: None,
         };
-        Ok(Self {
-            parameters: parameters.clone(),
-            description,
-        })
+        Ok(Self { parameters: parameters.clone(), description })
     }
 }
 
@@ -93,12 +66,7 @@ fn check(
     let odd = rows.iter().map(Vec::len).find(|&length| length != columns);
     if rows.len() != expected_rows || odd.is_some() {
         let columns = odd.or(rows.first().map(Vec::len)).unwrap_or(0);
-        return Err(PlantParameterError::Shape {
-            matrix,
-            rows: rows.len(),
-            columns,
-            expected: expected.into(),
-        });
+        return Err(PlantParameterError::Shape { matrix, rows: rows.len(), columns, expected: expected.into() });
     }
     match rows.iter().flatten().all(|entry| entry.is_finite()) {
         true => Ok(()),
@@ -120,15 +88,9 @@ impl Equations for Linear {
     }
 
     fn dynamics<S: Scalar>(&self, x: &[S], u: &[S], w: &[S], dx: &mut [S]) {
-        for ((rate, a), b) in dx
-            .iter_mut()
-            .zip(&self.parameters.a)
-            .zip(&self.parameters.b)
-        {
+        for ((rate, a), b) in dx.iter_mut().zip(&self.parameters.a).zip(&self.parameters.b) {
             *rate = product(a, x)
-                + b.iter()
-                    .zip(u.iter().zip(w))
-                    .fold(S::from(0.0), |sum, (b, (&u, &w))| sum + (u + w) * *b);
+                + b.iter().zip(u.iter().zip(w)).fold(S::from(0.0), |sum, (b, (&u, &w))| sum + (u + w) * *b);
         }
     }
 
@@ -149,7 +111,5 @@ impl Equations for Linear {
 }
 
 fn product<S: Scalar>(row: &[f64], x: &[S]) -> S {
-    row.iter()
-        .zip(x)
-        .fold(S::from(0.0), |sum, (a, &x)| sum + x * *a)
+    row.iter().zip(x).fold(S::from(0.0), |sum, (a, &x)| sum + x * *a)
 }

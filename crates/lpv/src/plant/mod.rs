@@ -35,14 +35,7 @@ pub struct Signal {
 impl Signal {
     /// Signals from pairs (name, unit); none of them wraps.
     pub fn list(pairs: &[(&str, &str)]) -> Vec<Signal> {
-        pairs
-            .iter()
-            .map(|&(name, unit)| Signal {
-                name: name.into(),
-                unit: unit.into(),
-                wraps: false,
-            })
-            .collect()
+        pairs.iter().map(|&(name, unit)| Signal { name: name.into(), unit: unit.into(), wraps: false }).collect()
     }
 }
 
@@ -133,11 +126,7 @@ impl Description {
     pub fn state_error(&self, x: &[f64], reference: &[f64], error: &mut [f64]) {
         for (i, signal) in self.states.iter().enumerate() {
             let difference = x[i] - reference[i];
-            error[i] = if signal.wraps {
-                crate::math::angle::wrap(difference)
-            } else {
-                difference
-            };
+            error[i] = if signal.wraps { crate::math::angle::wrap(difference) } else { difference };
         }
     }
 }

@@ -31,10 +31,7 @@ impl Equations for Pendulum {
 
     /// Upright, at rest.
     fn trim(&self, _rho: f64) -> OperatingPoint {
-        OperatingPoint {
-            state: vec![0.0; 2],
-            input: vec![0.0],
-        }
+        OperatingPoint { state: vec![0.0; 2], input: vec![0.0] }
     }
 
     fn dynamics<S: Scalar>(&self, x: &[S], u: &[S], w: &[S], dx: &mut [S]) {

@@ -82,14 +82,8 @@ impl Quadrotor {
             ("psi", "rad"),
         ]);
         states[11].wraps = true;
-        let mut outputs = Signal::list(&[
-            ("r_x", "m"),
-            ("r_y", "m"),
-            ("r_z", "m"),
-            ("phi", "rad"),
-            ("theta", "rad"),
-            ("psi", "rad"),
-        ]);
+        let mut outputs =
+            Signal::list(&[("r_x", "m"), ("r_y", "m"), ("r_z", "m"), ("phi", "rad"), ("theta", "rad"), ("psi", "rad")]);
         outputs[5].wraps = true;
         let arm = parameters.arm_length_m;
         let mut state_limits = vec![None; 12];
@@ -116,18 +110,10 @@ impl Quadrotor {
                 position: [3, 4, 5],
                 euler_xyz: [9, 10, 11],
                 arm_length_m: arm,
-                rotors: vec![
-                    [arm, 0.0, 0.0],
-                    [0.0, arm, 0.0],
-                    [-arm, 0.0, 0.0],
-                    [0.0, -arm, 0.0],
-                ],
+                rotors: vec![[arm, 0.0, 0.0], [0.0, arm, 0.0], [-arm, 0.0, 0.0], [0.0, -arm, 0.0]],
             }),
         };
-        Self {
-            parameters,
-            description,
-        }
+        Self { parameters, description }
     }
 }
 
@@ -140,10 +126,7 @@ impl Equations for Quadrotor {
     fn trim(&self, psi_rad: f64) -> OperatingPoint {
         let mut state = vec![0.0; 12];
         state[11] = psi_rad;
-        OperatingPoint {
-            state,
-            input: vec![self.parameters.mass_kg * self.parameters.gravity_m_s2 / 4.0; 4],
-        }
+        OperatingPoint { state, input: vec![self.parameters.mass_kg * self.parameters.gravity_m_s2 / 4.0; 4] }
     }
 
     /// (6.8): (3.26) with the process noise wᵢ added to each rotor force.

@@ -11,7 +11,7 @@ use crate::plant::Plant;
 use serde::Serialize;
 
 /// A state beyond this is a divergence, whatever its unit: no plant here works at such values.
-const DIVERGED: f64 = 1e6;
+pub const FARTHEST: f64 = 1e6;
 
 /// What to fly.
 pub struct Simulation<'a> {
@@ -55,6 +55,11 @@ pub enum Outcome {
         state: usize,
         /// Its last value.
         value: f64,
+    },
+    /// The estimate or its covariance left all bounds, though the plant had not.
+    EstimatorDiverged {
+        /// When.
+        time_s: f64,
     },
 }
 
@@ -103,22 +108,15 @@ impl Simulation<'_> {
         let (n, m) = (description.states.len(), description.inputs.len());
         let (nw, ny) = (description.disturbances.len(), description.outputs.len());
         let covariance = self.noise.filter(|_| self.estimate);
-        let mut filter =
-            covariance.map(|covariance| Ekf::new(self.plant, covariance, self.sample_time_s));
+        let mut filter = covariance.map(|covariance| Ekf::new(self.plant, covariance, self.sample_time_s));
         let mut consistency = covariance.map(|_| ConsistencyStatistics::new(n));
         let mut process = self.noise.map(|noise| {
             let held = 1.0 / (self.sample_time_s * self.sample_time_s);
             NoiseStream::new(self.seed, self.run, Channel::Process, &noise.process, held)
         });
-        let mut measurement = self.noise.map(|noise| {
-            NoiseStream::new(
-                self.seed,
-                self.run,
-                Channel::Measurement,
-                &noise.measurement,
-                1.0,
-            )
-        });
+        let mut measurement = self
+            .noise
+            .map(|noise| NoiseStream::new(self.seed, self.run, Channel::Measurement, &noise.measurement, 1.0));
 
         // z = [x, J, x̂, P]; the last two only with a filter
         let size = n + 1 + if filter.is_some() { n + n * n } else { 0 };
@@ -132,8 +130,7 @@ impl Simulation<'_> {
         let mut law = Law::new(controller, n);
         let mut method = RungeKutta4::new(size);
         let mut trajectory = Trajectory::default();
-        let (mut u, mut w, mut v, mut y) =
-            (vec![0.0; m], vec![0.0; nw], vec![0.0; ny], vec![0.0; ny]);
+        let (mut u, mut w, mut v, mut y) = (vec![0.0; m], vec![0.0; nw], vec![0.0; ny], vec![0.0; ny]);
         let (mut deviation, mut error) = (vec![0.0; m], vec![0.0; n]);
         let samples = (self.duration_s / self.sample_time_s).round() as usize;
         let step_s = self.sample_time_s / self.steps_per_sample as f64;
@@ -142,28 +139,21 @@ impl Simulation<'_> {
         for k in 0..=samples {
             let t_s = k as f64 * self.sample_time_s;
             if let Some(state) = (0..n).find(|&i| {
-                let limit = description.state_limits[i]
-                    .unwrap_or(DIVERGED)
-                    .min(DIVERGED);
+                let limit = description.state_limits[i].unwrap_or(FARTHEST).min(FARTHEST);
                 !(z[i].abs() < limit) // true for NaN too
             }) {
-                outcome = Outcome::Diverged {
-                    time_s: t_s,
-                    state,
-                    value: z[state],
-                };
+                outcome = Outcome::Diverged { time_s: t_s, state, value: z[state] };
+                break;
+            }
+            // a covariance is a square: its bound is the square of the states'
+            if z[n..].iter().any(|value| value.is_nan() || value.abs() >= FARTHEST * FARTHEST) {
+                outcome = Outcome::EstimatorDiverged { time_s: t_s };
                 break;
             }
             let reference = self.reference.at(t_s);
-            let feedback = if filter.is_some() {
-                &z[n + 1..2 * n + 1]
-            } else {
-                &z[..n]
-            };
+            let feedback = if filter.is_some() { &z[n + 1..2 * n + 1] } else { &z[..n] };
             description.state_error(feedback, &reference, &mut error);
-            let rho = controller
-                .scheduling_state
-                .map_or(0.0, |state| feedback[state]);
+            let rho = controller.scheduling_state.map_or(0.0, |state| feedback[state]);
             let saturated = law.input(rho, &error, &mut u);
             if let Some(process) = &mut process {
                 process.next(&mut w);
@@ -178,11 +168,7 @@ impl Simulation<'_> {
                 description.state_error(estimate, &z[..n], &mut error);
                 statistics.add(&error, covariance);
                 trajectory.estimates.push(estimate.to_vec());
-                trajectory.deviations.push(
-                    (0..n)
-                        .map(|i| covariance[i * n + i].max(0.0).sqrt())
-                        .collect(),
-                );
+                trajectory.deviations.push((0..n).map(|i| covariance[i * n + i].max(0.0).sqrt()).collect());
             }
             trajectory.time_s.push(t_s);
             trajectory.states.push(z[..n].to_vec());
@@ -190,11 +176,7 @@ impl Simulation<'_> {
             trajectory.saturated.push(saturated);
             trajectory.cost.push(z[n]);
 
-            for ((d, u), operating) in deviation
-                .iter_mut()
-                .zip(&u)
-                .zip(&controller.operating_input)
-            {
+            for ((d, u), operating) in deviation.iter_mut().zip(&u).zip(&controller.operating_input) {
                 *d = u - operating;
             }
             for step in 0..self.steps_per_sample {
@@ -214,11 +196,7 @@ impl Simulation<'_> {
             }
             trajectory.references.push(reference);
         }
-        Flight {
-            outcome,
-            trajectory,
-            consistency: consistency.map(|statistics| statistics.result()),
-        }
+        Flight { outcome, trajectory, consistency: consistency.map(|statistics| statistics.result()) }
     }
 }
 
@@ -239,18 +217,12 @@ impl StageCost {
                 .map(|(k, value)| (k / columns, k % columns, value))
                 .collect()
         };
-        Self {
-            state: entries(q),
-            input: entries(r),
-        }
+        Self { state: entries(q), input: entries(r) }
     }
 
     fn value(&self, error: &[f64], deviation: &[f64]) -> f64 {
         let form = |entries: &[(usize, usize, f64)], v: &[f64]| {
-            entries
-                .iter()
-                .map(|&(i, j, value)| value * v[i] * v[j])
-                .sum::<f64>()
+            entries.iter().map(|&(i, j, value)| value * v[i] * v[j]).sum::<f64>()
         };
         form(&self.state, error) + form(&self.input, deviation)
     }

@@ -9,7 +9,7 @@ mod performance;
 mod reference;
 mod runge_kutta;
 
-pub use closed_loop::{Flight, Outcome, Simulation, Trajectory};
+pub use closed_loop::{FARTHEST, Flight, Outcome, Simulation, Trajectory};
 pub use noise::{Channel, NoiseStream};
 pub use performance::{Performance, StepResponse, performance};
 pub use reference::{Reference, SetPoint};

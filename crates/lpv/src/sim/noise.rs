@@ -34,11 +34,7 @@ impl NoiseStream {
             Some(factor) => (0..n).map(|i| (0..n).map(|j| factor[(i, j)] * root).collect()).collect(),
             None => vec![vec![f64::NAN; n]; n],
         };
-        Self {
-            generator,
-            factor,
-            normal: vec![0.0; n],
-        }
+        Self { generator, factor, normal: vec![0.0; n] }
     }
 
     /// The next vector.

@@ -15,29 +15,15 @@ pub struct RungeKutta4 {
 impl RungeKutta4 {
     /// For systems of `size` equations.
     pub fn new(size: usize) -> Self {
-        Self {
-            stage: vec![0.0; size],
-            slope: vec![0.0; size],
-            sum: vec![0.0; size],
-        }
+        Self { stage: vec![0.0; size], slope: vec![0.0; size], sum: vec![0.0; size] }
     }
 
     /// Advance `z` by `step_s` along ż = f(t, z) from time `t_s`; `f(t, z, ż)` writes the slope.
-    pub fn step(
-        &mut self,
-        t_s: f64,
-        step_s: f64,
-        z: &mut [f64],
-        mut f: impl FnMut(f64, &[f64], &mut [f64]),
-    ) {
+    pub fn step(&mut self, t_s: f64, step_s: f64, z: &mut [f64], mut f: impl FnMut(f64, &[f64], &mut [f64])) {
         self.sum.fill(0.0);
         for i in 0..4 {
             for ((stage, z), slope) in self.stage.iter_mut().zip(z.iter()).zip(&self.slope) {
-                *stage = if i == 0 {
-                    *z
-                } else {
-                    z + step_s * C[i] * slope
-                };
+                *stage = if i == 0 { *z } else { z + step_s * C[i] * slope };
             }
             f(t_s + C[i] * step_s, &self.stage, &mut self.slope);
             for (sum, slope) in self.sum.iter_mut().zip(&self.slope) {
@@ -69,16 +55,10 @@ mod tests {
             (sum(&|i| B[i] * C[i].powi(3)), 1.0 / 4.0),
             (sum(&|i| B[i] * C[i] * a(i) * c(before(i))), 1.0 / 8.0),
             (sum(&|i| B[i] * a(i) * c(before(i)).powi(2)), 1.0 / 12.0),
-            (
-                sum(&|i| B[i] * a(i) * c(before(i)) * c(before(i) - 1)),
-                1.0 / 24.0,
-            ),
+            (sum(&|i| B[i] * a(i) * c(before(i)) * c(before(i) - 1)), 1.0 / 24.0),
         ];
         for (k, (found, expected)) in conditions.into_iter().enumerate() {
-            assert!(
-                (found - expected).abs() < 1e-15,
-                "condition {k}: {found} is not {expected}"
-            );
+            assert!((found - expected).abs() < 1e-15, "condition {k}: {found} is not {expected}");
         }
     }
 

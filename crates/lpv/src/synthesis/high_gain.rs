@@ -22,6 +22,7 @@
 //! [`gain_margin`](HighGainOptions::gain_margin). All grid points get the smallest of their s, so that K is smooth in ρ;
 //! each mixture is then verified at it.
 
+use super::back_off::mixtures_hold;
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
 use super::slpvqr::not_definite;
 use super::{CostWeights, FrozenDesign, SynthesisError};
@@ -45,10 +46,7 @@ pub struct HighGainOptions {
 
 impl Default for HighGainOptions {
     fn default() -> Self {
-        Self {
-            recovery: 0.05,
-            gain_margin: 2.0,
-        }
+        Self { recovery: 0.05, gain_margin: 2.0 }
     }
 }
 
@@ -67,13 +65,7 @@ pub(super) struct Segment {
 /// The rows of L where `v` is set and of M elsewhere: S(v, L, M) (5.11).
 fn mixture(vertex: usize, l: &Expr, m: &Expr) -> Expr {
     let selector = |bit: usize| {
-        Mat::from_fn(l.nrows(), l.nrows(), |i, j| {
-            if i == j && (vertex >> i & 1) == bit {
-                1.0
-            } else {
-                0.0
-            }
-        })
+        Mat::from_fn(l.nrows(), l.nrows(), |i, j| if i == j && (vertex >> i & 1) == bit { 1.0 } else { 0.0 })
     };
     selector(1) * l + selector(0) * m
 }
@@ -93,16 +85,10 @@ pub(super) fn segment(
     let m = problem.rectangular("M", inputs, n);
     for vertex in 0..1usize << inputs {
         let name = format!("performance of mixture {vertex:0inputs$b}");
-        problem.positive_definite(
-            &name,
-            performance(&y, &mixture(vertex, &l, &m), model, &inverse),
-        );
+        problem.positive_definite(&name, performance(&y, &mixture(vertex, &l, &m), model, &inverse));
     }
     for (i, &bound) in sigma.iter().enumerate() {
-        problem.positive_definite(
-            &format!("input {} unsaturated", i + 1),
-            unsaturated(&y, m.row(i), bound, gamma),
-        );
+        problem.positive_definite(&format!("input {} unsaturated", i + 1), unsaturated(&y, m.row(i), bound, gamma));
     }
     problem.maximize(&y.trace());
     let answer = solve(&problem, model.rho)?;
@@ -122,9 +108,7 @@ pub(super) fn segment(
 impl Segment {
     /// K_s
     fn gain(&self, s: f64) -> Mat<f64> {
-        Mat::from_fn(self.low.nrows(), self.low.ncols(), |i, j| {
-            (1.0 - s) * self.low[(i, j)] + s * self.high[(i, j)]
-        })
+        Mat::from_fn(self.low.nrows(), self.low.ncols(), |i, j| (1.0 - s) * self.low[(i, j)] + s * self.high[(i, j)])
     }
 
     /// The s that the rule of the module takes at this point alone.
@@ -135,13 +119,8 @@ impl Segment {
         sample_time_s: f64,
         options: &HighGainOptions,
     ) -> Result<f64, SynthesisError> {
-        let regulator =
-            riccati::solve(&model.a, &model.b, &weights.q, &weights.r).map_err(|source| {
-                SynthesisError::Riccati {
-                    rho: self.rho,
-                    source,
-                }
-            })?;
+        let regulator = riccati::solve(&model.a, &model.b, &weights.q, &weights.r)
+            .map_err(|source| SynthesisError::Riccati { rho: self.rho, source })?;
         let y0 = inverse_spd(&regulator.p).ok_or(SynthesisError::Unbounded { rho: self.rho })?;
         let (ad, bd) = discretize(&model.a, &model.b, sample_time_s);
         let sampled_is_stable = |k: &Mat<f64>, factor: f64| {
@@ -159,34 +138,22 @@ impl Segment {
             .map(|k| 10f64.powf(f64::from(k) / 10.0))
             .filter_map(|s| {
                 let k = self.gain(s);
-                (sampled_is_stable(&k, 1.0) && sampled_is_stable(&k, options.gain_margin))
-                    .then_some((s, cost(&k)?))
+                (sampled_is_stable(&k, 1.0) && sampled_is_stable(&k, options.gain_margin)).then_some((s, cost(&k)?))
             })
             .collect();
-        let least = candidates
-            .iter()
-            .map(|&(_, cost)| cost)
-            .fold(f64::INFINITY, f64::min);
+        let least = candidates.iter().map(|&(_, cost)| cost).fold(f64::INFINITY, f64::min);
         candidates
             .iter()
             .find(|&&(_, cost)| cost <= (1.0 + options.recovery) * least)
             .map(|&(s, _)| s)
-            .ok_or(SynthesisError::SampleTime {
-                rho: self.rho,
-                sample_time_s,
-            })
+            .ok_or(SynthesisError::SampleTime { rho: self.rho, sample_time_s })
     }
 
     /// The design with gain K_s, or with the largest s/2^k at which every mixture holds (k = 0 for diagonal R).
-    pub(super) fn into_design(
-        self,
-        model: &FrozenModel,
-        weights: &CostWeights,
-        mut s: f64,
-    ) -> FrozenDesign {
+    pub(super) fn into_design(self, model: &FrozenModel, weights: &CostWeights, mut s: f64) -> FrozenDesign {
         // s = 0 satisfies the inequalities, so halving ends; 2⁻⁶⁰ of a gain is rounding
         for _ in 0..60 {
-            if self.mixtures_hold(model, weights, &self.gain(s)) {
+            if mixtures_hold(model, weights, &self.p, &self.gain(s), Some(&self.low)) {
                 break;
             }
             s *= 0.5;
@@ -200,24 +167,5 @@ impl Segment {
             riccati_difference: None,
             iterations: self.iterations,
         }
-    }
-
-    /// Whether every S(v, K, F) meets the cost bound xᵀPx: PA_S + A_SᵀP + Q + SᵀRS ≺ 0 for A_S = A − BS (A.48), by
-    /// Cholesky factorisation.
-    fn mixtures_hold(&self, model: &FrozenModel, weights: &CostWeights, k: &Mat<f64>) -> bool {
-        (0..1usize << k.nrows()).all(|vertex| {
-            let s = Mat::from_fn(k.nrows(), k.ncols(), |i, j| {
-                if vertex >> i & 1 == 1 {
-                    k[(i, j)]
-                } else {
-                    self.low[(i, j)]
-                }
-            });
-            let flow = &self.p * (&model.a - &model.b * &s);
-            let decrease = &flow + flow.transpose() + &weights.q + s.transpose() * &weights.r * &s;
-            let decrease =
-                Mat::from_fn(decrease.nrows(), decrease.ncols(), |i, j| -decrease[(i, j)]);
-            inverse_spd(&decrease).is_some()
-        })
     }
 }

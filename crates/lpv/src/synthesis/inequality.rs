@@ -4,7 +4,7 @@ use super::SynthesisError;
 use crate::math::Mat;
 use crate::math::matrix::inverse_spd;
 use crate::model::FrozenModel;
-use lmi::{Answer, Expr, Options, Outcome, Problem};
+use lmi::{Answer, Expr, InaccurateReason, Options, Outcome, Problem};
 
 /// Q⁻¹ and R⁻¹, which the inequalities hold as constants.
 pub(super) struct InverseWeights {
@@ -15,12 +15,8 @@ pub(super) struct InverseWeights {
 impl InverseWeights {
     /// The inverses of Q ≻ 0 and R ≻ 0. The caller has checked definiteness.
     pub fn new(weights: &super::CostWeights) -> Self {
-        let inverse =
-            |m: &Mat<f64>| inverse_spd(m).expect("weights are checked to be positive definite");
-        Self {
-            q: inverse(&weights.q),
-            r: inverse(&weights.r),
-        }
+        let inverse = |m: &Mat<f64>| inverse_spd(m).expect("weights are checked to be positive definite");
+        Self { q: inverse(&weights.q), r: inverse(&weights.r) }
     }
 }
 
@@ -33,21 +29,12 @@ impl InverseWeights {
 /// ```
 ///
 /// Equivalent to V̇ < −xᵀQx − uᵀRu for V = xᵀY⁻¹x under u = −LY⁻¹x.
-pub(super) fn performance(
-    y: &Expr,
-    l: &Expr,
-    model: &FrozenModel,
-    inverse: &InverseWeights,
-) -> Expr {
+pub(super) fn performance(y: &Expr, l: &Expr, model: &FrozenModel, inverse: &InverseWeights) -> Expr {
     let flow = &model.a * y - &model.b * l;
     Expr::symmetric_blocks(vec![
         vec![-(&flow + flow.t())],
         vec![y.clone(), Expr::constant(inverse.q.clone())],
-        vec![
-            l.clone(),
-            Expr::zeros(l.nrows(), y.ncols()),
-            Expr::constant(inverse.r.clone()),
-        ],
+        vec![l.clone(), Expr::zeros(l.nrows(), y.ncols()), Expr::constant(inverse.r.clone())],
     ])
 }
 
@@ -74,17 +61,20 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
                 .map(|(z, block)| (weight(z) / total, block.name.as_str()))
                 .collect();
             shares.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let carriers = shares
-                .iter()
-                .take(3)
-                .map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share))
-                .collect();
+            let carriers =
+                shares.iter().take(3).map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
             Err(SynthesisError::Infeasible { rho, carriers })
         }
         Outcome::Unbounded(_) => Err(SynthesisError::Unbounded { rho }),
-        Outcome::Inaccurate(reason) => Err(SynthesisError::Inaccurate {
-            rho,
-            reason: format!("{reason:?}"),
-        }),
+        Outcome::Inaccurate(reason) => {
+            let reason = match reason {
+                InaccurateReason::IterationLimit => "it reached its iteration limit",
+                InaccurateReason::TimeLimit => "it reached its time limit",
+                InaccurateReason::Cancelled => "it was cancelled",
+                InaccurateReason::Stalled => "rounding errors stopped its progress",
+                InaccurateReason::NotVerified => "its answer did not pass the check of its blocks",
+            };
+            Err(SynthesisError::Inaccurate { rho, reason: reason.into() })
+        }
     }
 }

@@ -8,13 +8,6 @@ use crate::math::riccati;
 use crate::model::FrozenModel;
 use lmi::Problem;
 
-/// By how much Q is inflated before the Riccati equation is solved, relative.
-///
-/// The optimum of Theorem 4.5 lies on the boundary of its strict inequality: there the inequality is an equation. The
-/// solution for (1 + δ)Q satisfies it strictly, −V̇ − xᵀQx − uᵀRu = δ xᵀQx > 0, and raises the bound by less than the
-/// factor 1 + δ.
-pub const STRICTNESS: f64 = 1e-6;
-
 /// Theorem 2.1 by linear matrix inequality: max tr Y subject to the performance inequality. Returns (Y, L).
 ///
 /// # Errors
@@ -27,10 +20,7 @@ pub fn lqr_by_inequality(
     let mut problem = Problem::new();
     let y = problem.symmetric("Y", n);
     let l = problem.rectangular("L", m, n);
-    problem.positive_definite(
-        "performance",
-        performance(&y, &l, model, &InverseWeights::new(weights)),
-    );
+    problem.positive_definite("performance", performance(&y, &l, model, &InverseWeights::new(weights)));
     problem.maximize(&y.trace());
     let answer = solve(&problem, model.rho)?;
     Ok((answer.value(&y), answer.value(&l), answer.iterations.len()))
@@ -38,20 +28,10 @@ pub fn lqr_by_inequality(
 
 /// Theorem 4.5 at one parameter value. The inequality's optimum is the Riccati solution, which gives the gain; the two
 /// are both computed, and how far their traces differ is kept in the result.
-pub(super) fn frozen(
-    model: &FrozenModel,
-    weights: &CostWeights,
-) -> Result<FrozenDesign, SynthesisError> {
+pub(super) fn frozen(model: &FrozenModel, weights: &CostWeights) -> Result<FrozenDesign, SynthesisError> {
     let (y_inequality, _, iterations) = lqr_by_inequality(model, weights)?;
-    let q = Mat::from_fn(weights.q.nrows(), weights.q.ncols(), |i, j| {
-        (1.0 + STRICTNESS) * weights.q[(i, j)]
-    });
-    let regulator = riccati::solve(&model.a, &model.b, &q, &weights.r).map_err(|source| {
-        SynthesisError::Riccati {
-            rho: model.rho,
-            source,
-        }
-    })?;
+    let regulator = riccati::solve(&model.a, &model.b, &weights.q, &weights.r)
+        .map_err(|source| SynthesisError::Riccati { rho: model.rho, source })?;
     let y = inverse_spd(&regulator.p).ok_or(SynthesisError::Unbounded { rho: model.rho })?;
     let trace_y = trace(&y);
     Ok(FrozenDesign {

@@ -11,19 +11,20 @@
 //!
 //! To add a method: one file with its inequalities, one variant in [`Method`].
 
+mod back_off;
 mod design;
 mod high_gain;
 mod inequality;
 mod lpvqr;
 mod region;
 mod slpvqr;
+mod validation;
 
-pub use design::{
-    CostWeights, Design, DesignError, DesignRequest, FrozenDesign, Method, ScheduleKind, design,
-};
+pub use design::{CostWeights, Design, DesignRequest, FrozenDesign, Method, ScheduleKind, design};
 pub use high_gain::HighGainOptions;
-pub use lpvqr::{STRICTNESS, lqr_by_inequality};
+pub use lpvqr::lqr_by_inequality;
 pub use region::covering_level;
+pub use validation::DesignError;
 
 /// Why there is no design.
 #[derive(Debug, thiserror::Error)]
@@ -45,16 +46,14 @@ pub enum SynthesisError {
         carriers: Vec<String>,
     },
     /// The objective is not bounded.
-    #[error(
-        "tr Y is unbounded at parameter {rho:.6}: some state costs nothing; give it a positive weight in Q"
-    )]
+    #[error("tr Y is unbounded at parameter {rho:.6}: some state costs nothing; give it a positive weight in Q")]
     Unbounded {
         /// Parameter value.
         rho: f64,
     },
     /// The solver stopped short of the accuracy asked for.
     #[error(
-        "the solver stopped short at parameter {rho:.6} ({reason}); try weights of less different size"
+        "the solver stopped short at parameter {rho:.6} ({reason}); try weights, γ and limits of less different size"
     )]
     Inaccurate {
         /// Parameter value.
@@ -72,9 +71,7 @@ pub enum SynthesisError {
         input: usize,
     },
     /// No gain on the high-gain segment is stable at the controller's sample time.
-    #[error(
-        "no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster"
-    )]
+    #[error("no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster")]
     SampleTime {
         /// Parameter value.
         rho: f64,

@@ -18,15 +18,9 @@ pub(super) fn frozen(
     let mut problem = Problem::new();
     let y = problem.symmetric("Y", n);
     let l = problem.rectangular("L", m, n);
-    problem.positive_definite(
-        "performance",
-        performance(&y, &l, model, &InverseWeights::new(weights)),
-    );
+    problem.positive_definite("performance", performance(&y, &l, model, &InverseWeights::new(weights)));
     for (i, &bound) in sigma.iter().enumerate() {
-        problem.positive_definite(
-            &format!("input {} unsaturated", i + 1),
-            unsaturated(&y, l.row(i), bound, gamma),
-        );
+        problem.positive_definite(&format!("input {} unsaturated", i + 1), unsaturated(&y, l.row(i), bound, gamma));
     }
     problem.maximize(&y.trace());
     let answer = solve(&problem, model.rho)?;
@@ -46,8 +40,5 @@ pub(super) fn frozen(
 
 /// Y of a solved problem is positive definite by the inequalities; anything else is an inaccuracy.
 pub(super) fn not_definite(rho: f64) -> SynthesisError {
-    SynthesisError::Inaccurate {
-        rho,
-        reason: "Y is not positive definite".into(),
-    }
+    SynthesisError::Inaccurate { rho, reason: "Y is not positive definite".into() }
 }

@@ -12,18 +12,12 @@ use rayon::prelude::*;
 /// (6.10)-(6.11) at T = 0.002 s.
 fn noise() -> NoiseCovariance {
     let angle = 5f64.to_radians().powi(2);
-    NoiseCovariance {
-        process: diagonal(&[1e-4; 4]),
-        measurement: diagonal(&[0.01, 0.01, 0.01, angle, angle, angle]),
-    }
+    NoiseCovariance { process: diagonal(&[1e-4; 4]), measurement: diagonal(&[0.01, 0.01, 0.01, angle, angle, angle]) }
 }
 
 fn high_gain() -> Design {
     designed(
-        Method::HighGainSlpvqr {
-            gamma: 20.0,
-            high_gain: HighGainOptions::default(),
-        },
+        Method::HighGainSlpvqr { gamma: 20.0, high_gain: HighGainOptions::default() },
         limits(),
         8,
         ScheduleKind::Vertices,
@@ -33,22 +27,11 @@ fn high_gain() -> Design {
 fn fly(design: &Design, seed: u64, run: u64, duration_s: f64) -> Flight {
     let plant = plant();
     let (weights, noise) = (weights(), noise());
-    let targets = vec![
-        (3, 1.0),
-        (4, 1.0),
-        (5, 1.0),
-        (11, std::f64::consts::FRAC_PI_2),
-    ];
+    let targets = vec![(3, 1.0), (4, 1.0), (5, 1.0), (11, std::f64::consts::FRAC_PI_2)];
     Simulation {
         plant: &*plant,
         initial_state: vec![0.0; 12],
-        reference: Reference::new(
-            vec![0.0; 12],
-            vec![SetPoint {
-                time_s: 1.0,
-                targets,
-            }],
-        ),
+        reference: Reference::new(vec![0.0; 12], vec![SetPoint { time_s: 1.0, targets }]),
         duration_s,
         sample_time_s: 0.002,
         steps_per_sample: 1,
@@ -69,13 +52,9 @@ fn fly(design: &Design, seed: u64, run: u64, duration_s: f64) -> Flight {
 #[test]
 fn filter_is_consistent_over_twenty_seeds() {
     let design = high_gain();
-    let results: Vec<_> = (0..20u64)
-        .into_par_iter()
-        .map(|seed| fly(&design, seed, 0, 20.0).consistency.unwrap())
-        .collect();
-    let mean = |value: &dyn Fn(&lpv::estimator::Consistency) -> f64| {
-        results.iter().map(value).sum::<f64>() / 20.0
-    };
+    let results: Vec<_> =
+        (0..20u64).into_par_iter().map(|seed| fly(&design, seed, 0, 20.0).consistency.unwrap()).collect();
+    let mean = |value: &dyn Fn(&lpv::estimator::Consistency) -> f64| results.iter().map(value).sum::<f64>() / 20.0;
     for state in 0..12 {
         let inside = mean(&|c| c.inside_three_sigma[state]);
         assert!((0.993..0.9995).contains(&inside), "state {state}: {inside}");
@@ -83,15 +62,10 @@ fn filter_is_consistent_over_twenty_seeds() {
     let nees = mean(&|c| c.nees);
     assert!((11.5..13.0).contains(&nees), "NEES {nees}");
     // computed elsewhere for hover: v .026 .026 .099, r .009 .009 .014, pqr .042 .042 .012, angles .0094 .0097 .0065
-    let expected = [
-        0.026, 0.026, 0.099, 0.009, 0.009, 0.014, 0.042, 0.042, 0.012, 0.0094, 0.0097, 0.0065,
-    ];
+    let expected = [0.026, 0.026, 0.099, 0.009, 0.009, 0.014, 0.042, 0.042, 0.012, 0.0094, 0.0097, 0.0065];
     for (state, expected) in expected.into_iter().enumerate() {
         let rms = mean(&|c| c.rms_error[state]);
-        assert!(
-            (rms / expected - 1.0).abs() < 0.15,
-            "state {state}: RMS {rms} is not about {expected}"
-        );
+        assert!((rms / expected - 1.0).abs() < 0.15, "state {state}: RMS {rms} is not about {expected}");
     }
 }
 
@@ -118,14 +92,10 @@ fn covariance_settles_at_the_riccati_solution() {
     let noise = noise();
     let q_c = Mat::from_fn(4, 4, |i, j| noise.process[(i, j)] / t);
     let r_c = Mat::from_fn(6, 6, |i, j| noise.measurement[(i, j)] * t);
-    let steady = riccati::solve(
-        &model.a.transpose().to_owned(),
-        &c.transpose().to_owned(),
-        &(&l * q_c * l.transpose()),
-        &r_c,
-    )
-    .unwrap()
-    .p;
+    let steady =
+        riccati::solve(&model.a.transpose().to_owned(), &c.transpose().to_owned(), &(&l * q_c * l.transpose()), &r_c)
+            .unwrap()
+            .p;
 
     let mut filter = Ekf::new(&*plant, &noise, t);
     let mut method = RungeKutta4::new(n + n * n);
@@ -140,11 +110,7 @@ fn covariance_settles_at_the_riccati_solution() {
         });
     }
     let found = from_row_slice(n, n, &z[n..]);
-    assert!(
-        (&found - &steady).norm_max() < 1e-6 * steady.norm_max(),
-        "{:e}",
-        (&found - &steady).norm_max()
-    );
+    assert!((&found - &steady).norm_max() < 1e-6 * steady.norm_max(), "{:e}", (&found - &steady).norm_max());
     assert!(
         z[..n].iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-12),
         "exact measurements leave a right estimate alone"

@@ -9,8 +9,7 @@ use proptest::prelude::*;
 fn thesis_state_jacobian(x: &[f64], force: f64) -> [[f64; 12]; 12] {
     let (m, ix, iy, iz) = (2.0, 1.25, 1.25, 2.5);
     let (p, q, r) = (x[6], x[7], x[8]);
-    let ((s_phi, c_phi), (s_theta, c_theta), (s_psi, c_psi)) =
-        (x[9].sin_cos(), x[10].sin_cos(), x[11].sin_cos());
+    let ((s_phi, c_phi), (s_theta, c_theta), (s_psi, c_psi)) = (x[9].sin_cos(), x[10].sin_cos(), x[11].sin_cos());
     let t_theta = s_theta / c_theta;
     let a = force / m;
     let a1 = [
@@ -23,23 +22,11 @@ fn thesis_state_jacobian(x: &[f64], force: f64) -> [[f64; 12]; 12] {
         [r * (iz - ix) / iy, 0.0, p * (iz - ix) / iy],
         [q * (ix - iy) / iz, p * (ix - iy) / iz, 0.0],
     ];
-    let a3 = [
-        [c_psi / c_theta, -s_psi / c_theta, 0.0],
-        [s_psi, c_psi, 0.0],
-        [-c_psi * t_theta, s_psi * t_theta, 1.0],
-    ];
+    let a3 = [[c_psi / c_theta, -s_psi / c_theta, 0.0], [s_psi, c_psi, 0.0], [-c_psi * t_theta, s_psi * t_theta, 1.0]];
     let a4 = [
-        [
-            0.0,
-            (p * c_psi - q * s_psi) * t_theta / c_theta,
-            -(p * s_psi + q * c_psi) / c_theta,
-        ],
+        [0.0, (p * c_psi - q * s_psi) * t_theta / c_theta, -(p * s_psi + q * c_psi) / c_theta],
         [0.0, 0.0, p * c_psi - q * s_psi],
-        [
-            0.0,
-            (q * s_psi - p * c_psi) / c_theta.powi(2),
-            (p * s_psi + q * c_psi) * t_theta,
-        ],
+        [0.0, (q * s_psi - p * c_psi) / c_theta.powi(2), (p * s_psi + q * c_psi) * t_theta],
     ];
     let mut jacobian = [[0.0; 12]; 12];
     for i in 0..3 {
@@ -70,10 +57,7 @@ fn thesis_input_jacobian(x: &[f64]) -> [[f64; 4]; 12] {
 
 fn assert_close(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
     for (k, (f, e)) in found.iter().zip(expected).enumerate() {
-        assert!(
-            (f - e).abs() <= tolerance * (1.0 + e.abs()),
-            "{what}, entry {k}: {f} is not {e}"
-        );
+        assert!((f - e).abs() <= tolerance * (1.0 + e.abs()), "{what}, entry {k}: {f} is not {e}");
     }
 }
 
@@ -111,11 +95,7 @@ proptest! {
 /// Step h = 6e-6: the truncation error h² and the rounding error ε/h are both below 1e-10 for these smooth functions.
 fn differences(plant: &dyn Plant, x: &[f64], u: &[f64]) {
     let description = plant.description();
-    let (n, m, ny) = (
-        description.states.len(),
-        description.inputs.len(),
-        description.outputs.len(),
-    );
+    let (n, m, ny) = (description.states.len(), description.inputs.len(), description.outputs.len());
     let (x, u) = (&x[..n], &u[..m]);
     let (w, v) = (vec![0.0; description.disturbances.len()], vec![0.0; ny]);
     let h = 6e-6;
@@ -128,11 +108,7 @@ fn differences(plant: &dyn Plant, x: &[f64], u: &[f64]) {
             f(&moved, &mut value);
             value
         };
-        side(1.0)
-            .iter()
-            .zip(side(-1.0))
-            .map(|(a, b)| (a - b) / (2.0 * h))
-            .collect::<Vec<f64>>()
+        side(1.0).iter().zip(side(-1.0)).map(|(a, b)| (a - b) / (2.0 * h)).collect::<Vec<f64>>()
     };
     for j in 0..n {
         let expected = column(j, &|x, dx| plant.dynamics(x, u, &w, dx), x, n);
@@ -175,26 +151,13 @@ fn measurement_jacobians_select_position_and_attitude() {
 
 #[test]
 fn every_plant_rests_at_its_operating_point() {
-    for spec in [
-        PlantSpec::Quadrotor(Default::default()),
-        PlantSpec::Pendulum {},
-        PlantSpec::DoubleIntegrator {},
-    ] {
+    for spec in [PlantSpec::Quadrotor(Default::default()), PlantSpec::Pendulum {}, PlantSpec::DoubleIntegrator {}] {
         let plant = spec.build().unwrap();
         for rho in [-3.0, 0.0, 0.7] {
             let trim = plant.trim(rho);
             let mut rate = vec![1.0; trim.state.len()];
-            plant.dynamics(
-                &trim.state,
-                &trim.input,
-                &vec![0.0; plant.description().disturbances.len()],
-                &mut rate,
-            );
-            assert!(
-                rate.iter().all(|r| r.abs() < 1e-14),
-                "{} does not rest: {rate:?}",
-                plant.description().name
-            );
+            plant.dynamics(&trim.state, &trim.input, &vec![0.0; plant.description().disturbances.len()], &mut rate);
+            assert!(rate.iter().all(|r| r.abs() < 1e-14), "{} does not rest: {rate:?}", plant.description().name);
         }
     }
 }

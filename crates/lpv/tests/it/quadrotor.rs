@@ -7,26 +7,17 @@ use lpv::synthesis::{CostWeights, Design, DesignRequest, Method, ScheduleKind, d
 
 /// Q and R of (6.1)-(6.2).
 pub fn weights() -> CostWeights {
-    CostWeights {
-        q: diagonal(&[1., 1., 100., 1., 1., 50., 50., 50., 50., 1., 1., 100.]),
-        r: diagonal(&[0.001; 4]),
-    }
+    CostWeights { q: diagonal(&[1., 1., 100., 1., 1., 50., 50., 50., 50., 1., 1., 100.]), r: diagonal(&[0.001; 4]) }
 }
 
 /// [0, mg/2] for each rotor.
 pub fn limits() -> InputLimits {
-    InputLimits {
-        min: vec![Some(0.0); 4],
-        max: vec![Some(9.807); 4],
-    }
+    InputLimits { min: vec![Some(0.0); 4], max: vec![Some(9.807); 4] }
 }
 
 /// The quadrotor with gravity `gravity_m_s2`; the thesis's printed gains were made with 9.81, all else with 9.807.
 pub fn spec(gravity_m_s2: f64) -> PlantSpec {
-    PlantSpec::Quadrotor(QuadrotorParameters {
-        gravity_m_s2,
-        ..Default::default()
-    })
+    PlantSpec::Quadrotor(QuadrotorParameters { gravity_m_s2, ..Default::default() })
 }
 
 /// The quadrotor of Table 6.1.
@@ -35,12 +26,7 @@ pub fn plant() -> Box<dyn Plant> {
 }
 
 /// A design for the quadrotor of Table 6.1.
-pub fn designed(
-    method: Method,
-    limits: InputLimits,
-    grid_points: usize,
-    schedule: ScheduleKind,
-) -> Design {
+pub fn designed(method: Method, limits: InputLimits, grid_points: usize, schedule: ScheduleKind) -> Design {
     let request = DesignRequest {
         name: "test".into(),
         method,

@@ -9,8 +9,8 @@ use lpv::math::{Mat, riccati};
 use lpv::model::{PolytopicModel, linearize};
 use lpv::plant::PlantSpec;
 use lpv::synthesis::{
-    CostWeights, Design, DesignRequest, HighGainOptions, Method, ScheduleKind, SynthesisError,
-    design, lqr_by_inequality,
+    CostWeights, Design, DesignRequest, HighGainOptions, Method, ScheduleKind, SynthesisError, design,
+    lqr_by_inequality,
 };
 
 /// Theorem 2.1: the inequality's optimum is the Riccati solution, Y = P⁻¹.
@@ -85,13 +85,14 @@ fn lpvqr_gain_is_the_thesis_one_at_every_yaw() {
 fn printed_gain_is_unstable_and_ours_is_not() {
     let model = linearize(&*spec(9.81).build().unwrap(), 0.0);
     let regulator = riccati::solve(&model.a, &model.b, &weights().q, &weights().r).unwrap();
-    let printed = Mat::from_fn(4, 12, |i, j| {
-        if [0, 1, 3, 4, 9, 10].contains(&j) {
-            -regulator.k[(i, j)]
-        } else {
-            regulator.k[(i, j)]
-        }
-    });
+    let printed =
+        Mat::from_fn(
+            4,
+            12,
+            |i, j| {
+                if [0, 1, 3, 4, 9, 10].contains(&j) { -regulator.k[(i, j)] } else { regulator.k[(i, j)] }
+            },
+        );
     assert!((spectral_abscissa(&(&model.a - &model.b * printed)) - 3.263).abs() < 1e-3);
     assert!((spectral_abscissa(&(&model.a - &model.b * regulator.k)) + 0.7071).abs() < 1e-4);
 }
@@ -102,33 +103,19 @@ fn saturated_designs_reach_the_known_optima() {
     for (gamma, trace_y) in [(1.0, 5.472401), (10.0, 5.146219), (20.0, 5.087519)] {
         let low = designed(Method::Slpvqr { gamma }, limits(), 4, ScheduleKind::Grid);
         for point in &low.points {
-            assert!(
-                (point.trace_y - trace_y).abs() < 2e-6,
-                "γ = {gamma}: tr Y = {}",
-                point.trace_y
-            );
+            assert!((point.trace_y - trace_y).abs() < 2e-6, "γ = {gamma}: tr Y = {}", point.trace_y);
         }
     }
     let high = designed(
-        Method::HighGainSlpvqr {
-            gamma: 20.0,
-            high_gain: HighGainOptions::default(),
-        },
+        Method::HighGainSlpvqr { gamma: 20.0, high_gain: HighGainOptions::default() },
         limits(),
         4,
         ScheduleKind::Grid,
     );
     for point in &high.points {
-        assert!(
-            (point.trace_y - 5.087519).abs() < 2e-6,
-            "high gain: tr Y = {}",
-            point.trace_y
-        );
+        assert!((point.trace_y - 5.087519).abs() < 2e-6, "high gain: tr Y = {}", point.trace_y);
         let largest = point.gain.norm_max();
-        assert!(
-            (10.0..5000.0).contains(&largest),
-            "the gain of {largest} is not usable"
-        );
+        assert!((10.0..5000.0).contains(&largest), "the gain of {largest} is not usable");
     }
 }
 
@@ -141,10 +128,7 @@ fn bounds_and_certified_steps() {
     assert!((bound(&lpvqr) - 2.1356).abs() < 1e-4);
     for (gamma, step) in [(1.0, 0.65), (10.0, 1.76), (20.0, 1.81)] {
         let design = designed(Method::Slpvqr { gamma }, limits(), 4, ScheduleKind::Grid);
-        assert!(
-            ((gamma / bound(&design)).sqrt() - step).abs() < 0.005,
-            "γ = {gamma}"
-        );
+        assert!(((gamma / bound(&design)).sqrt() - step).abs() < 0.005, "γ = {gamma}");
     }
 }
 
@@ -154,10 +138,7 @@ fn designs_pass_their_check_and_broken_ones_fail() {
     let methods = [
         Method::Lpvqr,
         Method::Slpvqr { gamma: 10.0 },
-        Method::HighGainSlpvqr {
-            gamma: 10.0,
-            high_gain: HighGainOptions::default(),
-        },
+        Method::HighGainSlpvqr { gamma: 10.0, high_gain: HighGainOptions::default() },
     ];
     let plant = plant();
     for method in methods {
@@ -171,24 +152,14 @@ fn designs_pass_their_check_and_broken_ones_fail() {
         for point in &mut design.points {
             point.p = Mat::from_fn(12, 12, |i, j| 0.99 * point.p[(i, j)]);
         }
-        assert!(
-            check(&design, &*plant)
-                .iter()
-                .any(|claim| claim.verdict == Verdict::Refuted),
-            "{method:?}"
-        );
+        assert!(check(&design, &*plant).iter().any(|claim| claim.verdict == Verdict::Refuted), "{method:?}");
     }
 }
 
 /// A saved design is the design.
 #[test]
 fn designs_survive_their_file() {
-    let design = designed(
-        Method::Slpvqr { gamma: 1.0 },
-        limits(),
-        4,
-        ScheduleKind::Vertices,
-    );
+    let design = designed(Method::Slpvqr { gamma: 1.0 }, limits(), 4, ScheduleKind::Vertices);
     let json = serde_json::to_string(&design).unwrap();
     let read: Design = serde_json::from_str(&json).unwrap();
     assert_eq!(json, serde_json::to_string(&read).unwrap());
@@ -199,10 +170,7 @@ fn designs_survive_their_file() {
 /// γ = 1, 30, 60; gain (5.9) for γ = 1; and (5.6) for the LQR, whose bound is 0.130430.
 #[test]
 fn double_integrator_bounds() {
-    let weights = CostWeights {
-        q: diagonal(&[1.0, 1.0]),
-        r: diagonal(&[0.001]),
-    };
+    let weights = CostWeights { q: diagonal(&[1.0, 1.0]), r: diagonal(&[0.001]) };
     let request = |method, limits| DesignRequest {
         name: "slqr".into(),
         method,
@@ -214,36 +182,18 @@ fn double_integrator_bounds() {
     };
     let spec = PlantSpec::DoubleIntegrator {};
     let plant = spec.build().unwrap();
-    let unit = InputLimits {
-        min: vec![Some(-1.0)],
-        max: vec![Some(1.0)],
-    };
+    let unit = InputLimits { min: vec![Some(-1.0)], max: vec![Some(1.0)] };
     let x0 = [0.0, 2.0];
     for (gamma, bound) in [(1.0, 5.92367), (30.0, 39.6808), (60.0, 59.6849)] {
-        let design = design(
-            &spec,
-            &*plant,
-            &request(Method::Slpvqr { gamma }, unit.clone()),
-            &|_| {},
-        )
-        .unwrap();
+        let design = design(&spec, &*plant, &request(Method::Slpvqr { gamma }, unit.clone()), &|_| {}).unwrap();
         let found = quadratic_form(&design.points[0].p, &x0);
-        assert!(
-            (found / bound - 1.0).abs() < 2e-5,
-            "γ = {gamma}: {found} is not {bound}"
-        );
+        assert!((found / bound - 1.0).abs() < 2e-5, "γ = {gamma}: {found} is not {bound}");
         if gamma == 1.0 {
             assert!((design.points[0].gain[(0, 0)] - 0.437796).abs() < 2e-5);
             assert!((design.points[0].gain[(0, 1)] - 1.109393).abs() < 2e-5);
         }
     }
-    let lqr = design(
-        &spec,
-        &*plant,
-        &request(Method::Lpvqr, InputLimits::none(1)),
-        &|_| {},
-    )
-    .unwrap();
+    let lqr = design(&spec, &*plant, &request(Method::Lpvqr, InputLimits::none(1)), &|_| {}).unwrap();
     assert!((quadratic_form(&lqr.points[0].p, &x0) - 0.130430).abs() < 1e-6);
 }
 
@@ -252,12 +202,8 @@ fn double_integrator_bounds() {
 #[test]
 fn centre_of_the_yaw_polytope_has_no_roll_input() {
     let model = PolytopicModel::of_plant(&*plant()).unwrap();
-    let centre = Mat::from_fn(12, 12, |i, j| {
-        model.a.iter().map(|a| a[(i, j)]).sum::<f64>() / 4.0
-    });
-    assert!(
-        (0..12).all(|j| centre[(9, j)].abs() < 1e-13) && (0..4).all(|j| model.b[(9, j)] == 0.0)
-    );
+    let centre = Mat::from_fn(12, 12, |i, j| model.a.iter().map(|a| a[(i, j)]).sum::<f64>() / 4.0);
+    assert!((0..12).all(|j| centre[(9, j)].abs() < 1e-13) && (0..4).all(|j| model.b[(9, j)] == 0.0));
     assert!(lpv::math::eigen::unstabilizable_mode(&centre, &model.b).is_some());
 }
 
@@ -276,10 +222,7 @@ fn failures_name_their_cause() {
     let mut one_free = limits();
     (one_free.min[2], one_free.max[2]) = (None, None);
     let error = design(&spec, &*plant(), &request(one_free), &|_| {}).unwrap_err();
-    assert!(
-        matches!(error, SynthesisError::UnlimitedInput { input: 2 }),
-        "{error}"
-    );
+    assert!(matches!(error, SynthesisError::UnlimitedInput { input: 2 }), "{error}");
 }
 
 /// Y of a design is smaller the larger the region: tr Y falls with γ.
@@ -287,9 +230,7 @@ fn failures_name_their_cause() {
 fn trace_falls_with_the_region() {
     let traces: Vec<f64> = [1.0, 3.0, 9.0]
         .into_iter()
-        .map(|gamma| {
-            designed(Method::Slpvqr { gamma }, limits(), 4, ScheduleKind::Grid).points[0].trace_y
-        })
+        .map(|gamma| designed(Method::Slpvqr { gamma }, limits(), 4, ScheduleKind::Grid).points[0].trace_y)
         .collect();
     assert!(traces[0] > traces[1] && traces[1] > traces[2], "{traces:?}");
     let lpvqr = designed(Method::Lpvqr, InputLimits::none(4), 4, ScheduleKind::Grid);

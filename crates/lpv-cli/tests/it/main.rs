@@ -1,0 +1,6 @@
+//! The program as a user meets it: files and arguments in; files, messages and exit codes out.
+
+mod bad_input;
+mod program;
+mod run;
+mod stages;

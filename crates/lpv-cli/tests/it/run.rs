@@ -1,0 +1,326 @@
+//! `lpv run`: the whole job.
+
+use crate::program::{DOUBLE_INTEGRATOR, Place, QUADROTOR, edited};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// The data inside a report page.
+fn report_data(page: &str) -> Value {
+    let (_, rest) = page.split_once(r#"id="report-data">"#).unwrap();
+    let (data, _) = rest.split_once("</script>").unwrap();
+    serde_json::from_str(data).unwrap()
+}
+
+/// The rows of a CSV file as numbers, below its header.
+fn rows(csv: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut lines = csv.lines();
+    let header: Vec<String> = lines.next().unwrap().split(',').map(str::to_owned).collect();
+    let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|value| value.parse().unwrap()).collect()).collect();
+    for row in &rows {
+        assert_eq!(row.len(), header.len());
+        assert!(row.iter().all(|value| value.is_finite()), "{row:?}");
+    }
+    (header, rows)
+}
+
+/// `run.json` without what may differ from run to run.
+fn without_timings(record: &mut Value) {
+    match record {
+        Value::Object(map) => {
+            map.retain(|key, _| !key.ends_with("seconds") && key != "threads");
+            map.values_mut().for_each(without_timings);
+        }
+        Value::Array(list) => list.iter_mut().for_each(without_timings),
+        _ => {}
+    }
+}
+
+/// The files of the result folder `name`, `run.json` without its timings.
+fn result(place: &Place, name: &str) -> BTreeMap<String, Vec<u8>> {
+    let prefix = format!("{name}/");
+    let mut files: BTreeMap<String, Vec<u8>> = (place.files().into_iter())
+        .filter_map(|(path, bytes)| Some((path.strip_prefix(&prefix)?.to_owned(), bytes)))
+        .collect();
+    let mut record: Value = serde_json::from_slice(&files["run.json"]).unwrap();
+    without_timings(&mut record);
+    files.insert("run.json".into(), record.to_string().into_bytes());
+    files
+}
+
+#[test]
+fn writes_a_whole_result() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    let table = place.succeed("run scenario.toml");
+    assert_eq!(place.list("."), ["out", "scenario.toml"]);
+    assert_eq!(place.list("out"), ["cart"]);
+    assert_eq!(
+        place.list("out/cart"),
+        [
+            "design-filtered.json",
+            "design-high-gain.json",
+            "design-regulator.json",
+            "design-saturated.json",
+            "report.html",
+            "run.json",
+            "trajectory-filtered.csv",
+            "trajectory-high-gain.csv",
+            "trajectory-regulator.csv",
+            "trajectory-saturated.csv",
+        ]
+    );
+    for word in [
+        "controller",
+        "guaranteed cost (verdict)",
+        "actual cost",
+        "settling",
+        "peak input",
+        "saturated",
+        "High gain, γ = 2",
+        "numerical",
+        "out/cart/report.html",
+    ] {
+        assert!(table.contains(word), "{word}: {table}");
+    }
+    assert!(!table.contains("NaN") && !table.contains("inf"), "{table}");
+}
+
+#[test]
+fn record_holds_inputs_versions_seed_timings_verdicts_and_costs() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    place.succeed("run scenario.toml");
+    let record = place.json("out/cart/run.json");
+    assert_eq!(record["schema"], "lpv-run/1");
+    assert_eq!(record["scenario_toml"], DOUBLE_INTEGRATOR);
+    assert_eq!(record["lpv_version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(record["seed"], 7);
+    assert!(record["seconds"].as_f64().unwrap() > 0.0);
+    let controllers = record["controllers"].as_array().unwrap();
+    let names: Vec<&str> = (controllers.iter()).map(|controller| controller["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["regulator", "saturated", "high-gain", "filtered"]);
+    for controller in controllers {
+        assert_eq!(controller["verdict"], "numerical");
+        assert_eq!(controller["outcome"]["kind"], "completed");
+        let claims = controller["design_claims"].as_array().unwrap();
+        assert!(claims.iter().all(|claim| claim["margin"].as_f64().unwrap() > 0.0));
+        for timing in ["design_seconds", "check_seconds", "flight_seconds"] {
+            assert!(controller[timing].as_f64().unwrap() >= 0.0);
+        }
+        assert!(controller["actual_cost"].as_f64().unwrap() > 0.0);
+    }
+    // the step lies inside the certified set of the saturated design, so that its bound holds
+    let saturated = &controllers[1];
+    assert_eq!(saturated["guaranteed_cost_verdict"], "numerical");
+    let cost = |key: &str| saturated[key].as_f64().unwrap();
+    assert!(cost("actual_cost") <= cost("guaranteed_cost"));
+    assert_eq!(saturated["saturated_share"], 0.0);
+    // ... and outside that of the regulator: no number, and a claim that says so
+    assert_eq!(controllers[0]["guaranteed_cost"], Value::Null);
+    assert_eq!(controllers[0]["flight_claims"][0]["verdict"], "undecided");
+    assert!(controllers[3]["estimator_consistency"]["inside_three_sigma"][0].as_f64().unwrap() > 0.9);
+}
+
+#[test]
+fn report_holds_the_data_and_loads_nothing() {
+    let text = edited(
+        DOUBLE_INTEGRATOR,
+        "title = \"A cart\"",
+        "title = \"A <b>cart</b>\"\ndescription = '<!-- <script> </script> /*LPV_REPORT_DATA*/'",
+    );
+    let place = Place::with(text);
+    place.succeed("run scenario.toml");
+    let page = place.read("out/cart/report.html");
+    let data = report_data(&page);
+    assert_eq!(data["schema"], "lpv-report/1");
+    assert_eq!(data["title"], "A <b>cart</b>");
+    assert_eq!(data["description"], "<!-- <script> </script> /*LPV_REPORT_DATA*/");
+    let samples = data["time"].as_array().unwrap().len();
+    assert_eq!(samples, 301);
+    let runs = data["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 4);
+    for run in runs {
+        for series in ["states", "inputs"] {
+            for values in run[series].as_array().unwrap() {
+                assert_eq!(values.as_array().unwrap().len(), samples);
+                assert!(values.as_array().unwrap().iter().all(Value::is_f64));
+            }
+        }
+    }
+    assert!(runs[3]["estimation"]["error"].is_array() && runs[0]["estimation"].is_null());
+    for loads in [
+        "<script src",
+        "<script type=\"module\" src",
+        "<link rel=\"stylesheet\"",
+        "<iframe",
+        "<img",
+        "@import",
+        "url(http",
+        "url(//",
+        "src=\"http",
+        "href=\"http",
+        "src=\"//",
+        "src='http",
+    ] {
+        assert!(!page.contains(loads), "the page has \"{loads}\"");
+    }
+}
+
+#[test]
+fn trajectories_have_units_and_one_row_an_interval() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    place.succeed("run scenario.toml");
+    let (header, table) = rows(&place.read("out/cart/trajectory-saturated.csv"));
+    assert_eq!(
+        header,
+        ["t [s]", "x_1 [m]", "x_2 [m/s]", "reference x_1 [m]", "reference x_2 [m/s]", "u [m/s²]", "limited", "cost"]
+    );
+    assert_eq!(table.len(), 61, "3 s at 0.05 s, both ends");
+    for (k, row) in table.iter().enumerate() {
+        assert!((row[0] - 0.05 * k as f64).abs() < 1e-9);
+        assert_eq!(row[3], if k < 10 { 0.0 } else { 0.5 }, "the step at 0.5 s");
+        assert!((-1.0..=1.0).contains(&row[5]), "the limits");
+    }
+    assert_eq!(table[0][1..3], [0.0, 0.0]);
+    assert!(table.windows(2).all(|pair| pair[1][7] >= pair[0][7]), "cost only grows");
+
+    let (header, _) = rows(&place.read("out/cart/trajectory-filtered.csv"));
+    for column in ["measured x_1 [m]", "estimated x_2 [m/s]", "sigma x_1 [m]"] {
+        assert!(header.iter().any(|name| name == column), "{column}: {header:?}");
+    }
+}
+
+#[test]
+fn quadrotor_flies_from_file_to_report() {
+    let place = Place::with(QUADROTOR);
+    place.succeed("run scenario.toml --out flown");
+    let data = report_data(&place.read("flown/report.html"));
+    assert_eq!(data["plant"]["scene"]["kind"], "rigid-body");
+    assert_eq!(data["scheduling"]["weights"].as_array().unwrap().len(), 4);
+    for run in data["runs"].as_array().unwrap() {
+        assert_eq!(run["outcome"]["kind"], "completed");
+        // it moves: yaw is the fastest, and the regulator spends all its thrust on it
+        let psi_rad = run["states"][11].as_array().unwrap().last().unwrap();
+        assert!(psi_rad.as_f64().unwrap() > 1e-3, "{psi_rad}");
+    }
+    let (header, table) = rows(&place.read("flown/trajectory-regulator.csv"));
+    assert_eq!(header.len(), 1 + 12 + 12 + 4 + 2);
+    assert_eq!(table.len(), 26, "0.5 s at ten samples of 2 ms, both ends");
+    assert!(table.iter().all(|row| row[25..29].iter().all(|force| (0.0..=9.807).contains(force))));
+    let record = place.json("flown/run.json");
+    for controller in record["controllers"].as_array().unwrap() {
+        assert_eq!(controller["trace_y"].as_array().unwrap().len(), 4, "one a grid point");
+    }
+}
+
+#[test]
+fn same_seed_gives_the_same_bytes_whatever_the_threads() {
+    for scenario in [DOUBLE_INTEGRATOR, QUADROTOR] {
+        let place = Place::with(scenario);
+        place.succeed("run scenario.toml --out first");
+        for threads in ["1", "3"] {
+            let out = format!("threads-{threads}");
+            let mut command = place.command(&format!("run scenario.toml --out {out}"));
+            assert!(command.env("RAYON_NUM_THREADS", threads).output().unwrap().status.success());
+            let (first, again) = (result(&place, "first"), result(&place, &out));
+            for (name, bytes) in &first {
+                assert!(bytes == &again[name], "{name} differs with {threads} threads");
+            }
+            assert_eq!(first.len(), again.len());
+        }
+    }
+}
+
+#[test]
+fn another_seed_gives_other_noise_and_the_same_designs() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    place.succeed("run scenario.toml --out first");
+    place.write("scenario.toml", edited(DOUBLE_INTEGRATOR, "seed = 7", "seed = 8"));
+    place.succeed("run scenario.toml --out second");
+    let (first, second) = (result(&place, "first"), result(&place, "second"));
+    for (name, bytes) in &first {
+        let noisy = ["trajectory-filtered.csv", "report.html", "run.json"].contains(&name.as_str());
+        assert_eq!(bytes != &second[name], noisy, "{name}");
+    }
+}
+
+#[test]
+fn force_replaces_and_nothing_else_does() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    place.succeed("run scenario.toml");
+    let before = place.files();
+    place.lpv("run scenario.toml").refuses(2, &["out/cart", "earlier result", "--force", "--out"]);
+    assert!(place.files() == before, "the earlier result is untouched");
+
+    // a scenario of one controller less: nothing of the earlier result stays
+    let (shorter, _) = DOUBLE_INTEGRATOR.split_once("[[controller]]\nname = \"filtered\"").unwrap();
+    place.write("scenario.toml", shorter);
+    place.succeed("run scenario.toml --force");
+    assert_eq!(place.list("out"), ["cart"]);
+    assert!(!place.path("out/cart/trajectory-filtered.csv").exists());
+    assert_eq!(place.json("out/cart/run.json")["scenario_toml"], shorter);
+}
+
+#[test]
+fn an_empty_folder_is_a_place_for_a_result() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    std::fs::create_dir(place.path("here")).unwrap();
+    place.succeed("run scenario.toml --out here");
+    assert!(place.path("here/report.html").is_file());
+}
+
+#[test]
+fn a_required_verdict_that_is_missed_is_told_after_the_results() {
+    let place =
+        Place::with(edited(DOUBLE_INTEGRATOR, "method = \"lpvqr\"", "method = \"lpvqr\"\nrequire = \"proved\""));
+    let ended = place.lpv("run scenario.toml");
+    ended.refuses(4, &["\"regulator\" is numerical", "required is proved"]);
+    assert!(ended.out.contains("report.html"));
+    assert!(place.path("out/cart/report.html").is_file());
+
+    place.write(
+        "scenario.toml",
+        edited(DOUBLE_INTEGRATOR, "method = \"lpvqr\"", "method = \"lpvqr\"\nrequire = \"numerical\""),
+    );
+    place.succeed("run scenario.toml --force");
+}
+
+#[test]
+fn json_is_the_record_and_nothing_else() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    let out = place.succeed("run scenario.toml --json");
+    assert_eq!(out, place.read("out/cart/run.json"));
+    let record: Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(record["scenario"], "cart");
+}
+
+#[test]
+fn a_flight_without_set_points_is_regulation() {
+    let (start, rest) = DOUBLE_INTEGRATOR.split_once("[[set_point]]").unwrap();
+    let (_, controllers) = rest.split_once("\n\n").unwrap();
+    let text = edited(start, "[noise]", "[simulation.initial_state]\nx_1 = 0.2\n\n[noise]");
+    let place = Place::with(format!("{text}\n{controllers}"));
+    let table = place.succeed("run scenario.toml");
+    assert!(table.contains("  no step  "), "{table}");
+}
+
+/// The reader of standard output may go away (`lpv run … | head -1`): that is no defect, and no failure.
+#[test]
+fn a_reader_that_leaves_early_is_no_failure() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    let mut command = place.command("run scenario.toml --json");
+    let mut child =
+        (command.stdout(std::process::Stdio::piped())).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    assert!(output.status.success());
+    assert!(place.path("out/cart/run.json").is_file());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_behind_standard_output_is_told() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = place.command("run scenario.toml --json").stdout(full).output().unwrap();
+    crate::program::Ended::from(output).refuses(2, &["standard output"]);
+}

@@ -1,0 +1,146 @@
+//! `lpv design`, `lpv certify` and `lpv simulate`, each from the files of the one before.
+
+use crate::program::{DOUBLE_INTEGRATOR, Place, QUADROTOR};
+use serde_json::Value;
+
+const NAMES: [&str; 4] = ["regulator", "saturated", "high-gain", "filtered"];
+
+fn parsed(out: &str) -> Value {
+    serde_json::from_str(out).unwrap()
+}
+
+#[test]
+fn the_stages_give_what_a_run_gives() {
+    for (scenario, name) in [(DOUBLE_INTEGRATOR, "cart"), (QUADROTOR, "hop")] {
+        let place = Place::with(scenario);
+        place.succeed("run scenario.toml");
+        let run = place.files();
+        place.succeed("design scenario.toml");
+        place.succeed("simulate scenario.toml");
+        assert_eq!(place.list("out").len(), 3);
+        let stages = place.files();
+        let mut compared = 0;
+        for (path, bytes) in &stages {
+            let part = ["-designs/", "-flights/"].iter().find(|part| path.contains(*part));
+            if let Some(part) = part {
+                let whole = path.replace(&format!("{name}{part}"), &format!("{name}/"));
+                assert!(bytes == &run[&whole], "{path} differs from {whole}");
+                compared += 1;
+            }
+        }
+        assert_eq!(compared, run.len() - 3, "all but scenario, report and record");
+    }
+}
+
+#[test]
+fn design_prints_its_summary_as_json() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    let designs = parsed(&place.succeed("design scenario.toml --out designs --json"));
+    let names: Vec<&str> =
+        (designs.as_array().unwrap().iter()).map(|design| design["name"].as_str().unwrap()).collect();
+    assert_eq!(names, NAMES);
+    for design in designs.as_array().unwrap() {
+        assert_eq!(design["verdict"], "numerical");
+        assert!(design["convention"].as_str().unwrap().starts_with("u = u* - sat(K"));
+        assert_eq!(design["claims"].as_array().unwrap().len(), 3);
+    }
+    // closed form of the double integrator with Q = I, R = 0.1; Q is raised by 10⁻⁶ to make the inequality strict
+    let k = &designs[0]["gain_at_first_parameter"][0];
+    let root: f64 = 10.0;
+    assert!((k[0].as_f64().unwrap() - root.sqrt()).abs() < 1e-5);
+    assert!((k[1].as_f64().unwrap() - (root + 2.0 * root.sqrt()).sqrt()).abs() < 1e-5);
+}
+
+#[test]
+fn certify_checks_every_saved_design() {
+    for scenario in [DOUBLE_INTEGRATOR, QUADROTOR] {
+        let place = Place::with(scenario);
+        place.succeed("design scenario.toml --out designs");
+        for file in place.list("designs") {
+            let text = place.succeed(&format!("certify designs/{file}"));
+            assert!(text.contains(": numerical\n"), "{text}");
+            let certificate = parsed(&place.succeed(&format!("certify designs/{file} --json")));
+            assert_eq!(certificate["verdict"], "numerical");
+            let claims = certificate["claims"].as_array().unwrap();
+            assert!(claims.iter().all(|claim| claim["margin"].as_f64().unwrap() > 0.0));
+        }
+    }
+}
+
+#[test]
+fn simulate_prints_its_flights_as_json() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    place.succeed("design scenario.toml --out designs");
+    let flights = parsed(&place.succeed("simulate scenario.toml --designs designs --out flights --json"));
+    assert_eq!(flights.as_array().unwrap().len(), 4);
+    for (flight, name) in flights.as_array().unwrap().iter().zip(NAMES) {
+        assert_eq!(flight["name"], name);
+        assert_eq!(flight["outcome"]["kind"], "completed");
+        assert!(flight["actual_cost"].as_f64().unwrap() > 0.0);
+        assert!(place.path(&format!("flights/trajectory-{name}.csv")).is_file());
+    }
+}
+
+#[test]
+fn simulate_takes_the_designs_of_a_run_where_there_are_no_others() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    place.succeed("run scenario.toml");
+    let text = place.succeed("simulate scenario.toml");
+    assert!(text.contains("completed") && text.contains("out/cart-flights"), "{text}");
+}
+
+/// A gain of the wrong sign in the controller that flies is refuted, if the points are edited to match; where they are not,
+/// the file contradicts itself.
+#[test]
+fn a_negated_gain_is_refuted() {
+    for scenario in [DOUBLE_INTEGRATOR, QUADROTOR] {
+        let place = Place::with(scenario);
+        place.succeed("design scenario.toml --out designs");
+        for file in place.list("designs") {
+            let mut design = place.json(&format!("designs/{file}"));
+            let schedule = design.pointer_mut("/controller/schedule").unwrap();
+            let gain = if schedule["gain"].is_array() { "gain" } else { "gains" };
+            negate(&mut schedule[gain]);
+            place.write("edited.json", design.to_string());
+            place.lpv("certify edited.json").refuses(2, &["controller.schedule differs from points[].gain"]);
+
+            for point in design["points"].as_array_mut().unwrap() {
+                negate(&mut point["gain"]);
+            }
+            place.write("edited.json", design.to_string());
+            let ended = place.lpv("certify edited.json");
+            ended.refuses(4, &["refuted"]);
+            assert!(ended.out.contains("  refuted: "), "{}", ended.out);
+            let ended = place.lpv("certify edited.json --json");
+            assert_eq!((ended.code, &parsed(&ended.out)["verdict"]), (4, &"refuted".into()));
+        }
+    }
+}
+
+fn negate(value: &mut Value) {
+    match value {
+        Value::Array(list) => list.iter_mut().for_each(negate),
+        other => *other = (-other.as_f64().unwrap()).into(),
+    }
+}
+
+/// Every edit that takes the ground from a claim is refuted.
+#[test]
+fn an_edited_design_is_refuted() {
+    let place = Place::with(DOUBLE_INTEGRATOR);
+    place.succeed("design scenario.toml --out designs");
+    let edits: [(&str, Value); 5] = [
+        ("/method/gamma", 50.0.into()),
+        ("/controller/limits/max", vec![0.01].into()),
+        ("/points/0/p", vec![vec![0.1, 0.0], vec![0.0, 0.1]].into()),
+        ("/weights/q", vec![vec![100.0, 0.0], vec![0.0, 100.0]].into()),
+        ("/sample_time_s", 20.0.into()),
+    ];
+    for (pointer, value) in edits {
+        let mut design = place.json("designs/design-saturated.json");
+        *design.pointer_mut(pointer).unwrap() = value;
+        place.write("edited.json", design.to_string());
+        let ended = place.lpv("certify edited.json");
+        assert_eq!(ended.code, 4, "{pointer}: {}{}", ended.out, ended.err);
+    }
+}

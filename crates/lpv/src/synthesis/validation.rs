@@ -1,0 +1,192 @@
+//! Do the parts of a design fit together and with its plant? A design may come from a file that was edited, or from another
+//! tool.
+
+use super::{Design, FrozenDesign, Method};
+use crate::controller::Schedule;
+use crate::math::Mat;
+use crate::math::matrix::{inverse_spd, is_finite, is_symmetric};
+use crate::model::{BoxWeights, parameter_grid};
+use crate::plant::{Plant, PlantParameterError, Scheduling};
+
+/// Relative difference up to which numbers of a file count as equal: what printing and reading elsewhere may leave.
+const SAME: f64 = 1e-9;
+
+/// A design whose parts do not fit together.
+#[derive(Debug, thiserror::Error, PartialEq)]
+pub enum DesignError {
+    /// The plant cannot be built.
+    #[error("plant: {0}")]
+    Plant(#[from] PlantParameterError),
+    /// A part that is not what the plant or the method needs.
+    #[error("{key} {found}; it has to be {expected}")]
+    Part {
+        /// Which part, dotted.
+        key: String,
+        /// What it is.
+        found: String,
+        /// What it has to be.
+        expected: String,
+    },
+}
+
+fn refuse(key: impl Into<String>, found: impl Into<String>, expected: impl Into<String>) -> Result<(), DesignError> {
+    Err(DesignError::Part { key: key.into(), found: found.into(), expected: expected.into() })
+}
+
+impl Design {
+    /// Check that sizes, signs and parameters fit together and with the plant.
+    ///
+    /// # Errors
+    /// The first thing that does not fit.
+    pub fn validate(&self) -> Result<(), DesignError> {
+        let plant = self.plant.build()?;
+        let description = plant.description();
+        let (n, m) = (description.states.len(), description.inputs.len());
+        let scheduling = description.scheduling.as_ref();
+        if !(self.sample_time_s > 0.0 && self.sample_time_s.is_finite()) {
+            return refuse("sample_time_s", format!("is {}", self.sample_time_s), "positive and finite");
+        }
+        definite("weights.q", &self.weights.q, n)?;
+        definite("weights.r", &self.weights.r, m)?;
+        if let Some(gamma) = self.method.gamma().filter(|gamma| !(*gamma > 0.0 && gamma.is_finite())) {
+            return refuse("method.gamma", format!("is {gamma}"), "positive and finite");
+        }
+
+        let count = self.points.len();
+        if count == 0 || (scheduling.is_some() && count < 4) {
+            return refuse("points", format!("has {count} entries"), "at least 4, or 1 for a plant without parameter");
+        }
+        let grid: Vec<f64> = self.points.iter().map(|point| point.rho).collect();
+        same_grid("points[].rho", &grid, scheduling)?;
+        let is_high_gain = matches!(self.method, Method::HighGainSlpvqr { .. });
+        for (k, point) in self.points.iter().enumerate() {
+            shape(&format!("points[{k}].gain"), &point.gain, m, n)?;
+            definite(&format!("points[{k}].p"), &point.p, n)?;
+            match &point.auxiliary_gain {
+                Some(gain) if is_high_gain => shape(&format!("points[{k}].auxiliary_gain"), gain, m, n)?,
+                None if !is_high_gain => {}
+                _ => {
+                    return refuse(
+                        format!("points[{k}].auxiliary_gain"),
+                        "does not fit the method",
+                        "there for high gain only",
+                    );
+                }
+            }
+        }
+        self.validate_controller(&*plant, m, n)
+    }
+
+    fn validate_controller(&self, plant: &dyn Plant, m: usize, n: usize) -> Result<(), DesignError> {
+        let controller = &self.controller;
+        let scheduling = plant.description().scheduling.as_ref();
+        let operating = plant.trim(self.points[0].rho).input;
+        let is_trim = controller.operating_input.len() == m
+            && operating.iter().zip(&controller.operating_input).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()));
+        if !is_trim {
+            return refuse("controller.operating_input", "is not where the plant rests", format!("{operating:?}"));
+        }
+        let state = scheduling.map(|scheduling| scheduling.state);
+        if controller.scheduling_state != state {
+            let expected = state.map_or("null".to_owned(), |state| state.to_string());
+            return refuse("controller.scheduling_state", "is not the plant's", expected);
+        }
+        let limits = &controller.limits;
+        if limits.min.len() != m || limits.max.len() != m {
+            return refuse("controller.limits", "has the wrong length", format!("{m} numbers or nulls each"));
+        }
+        let encloses = |i: usize| {
+            limits.min[i].is_none_or(|min| min < operating[i]) && limits.max[i].is_none_or(|max| max > operating[i])
+        };
+        if !(0..m).all(encloses) {
+            return refuse("controller.limits", "exclude the operating input", "on either side of it, strictly");
+        }
+        if self.method.gamma().is_some() && limits.symmetric_bound(&operating).is_none() {
+            return refuse(
+                "controller.limits",
+                "leave an input unlimited",
+                "there for every input of a saturated method",
+            );
+        }
+
+        let gains = match (&controller.schedule, scheduling) {
+            (Schedule::Constant { gain }, None) => vec![gain],
+            (Schedule::Grid { parameters, period, gains }, Some(scheduling)) => {
+                same_grid("controller.schedule.parameters", parameters, Some(scheduling))?;
+                let expected = scheduling.periodic.then(|| scheduling.range[1] - scheduling.range[0]);
+                let same = |a: f64, b: f64| (a - b).abs() <= SAME * b.abs();
+                let is_same = match (*period, expected) {
+                    (Some(found), Some(expected)) => same(found, expected),
+                    (found, expected) => found == expected,
+                };
+                if !is_same || gains.len() != parameters.len() {
+                    return refuse(
+                        "controller.schedule",
+                        "does not fit the grid",
+                        "a gain for each parameter, with the plant's period",
+                    );
+                }
+                gains.iter().collect()
+            }
+            (Schedule::Vertices { weights, gains }, Some(scheduling)) => {
+                if *weights != BoxWeights::new(&scheduling.features) || gains.len() != weights.corners.len() {
+                    return refuse(
+                        "controller.schedule.weights",
+                        "are not the plant's",
+                        "a gain for each corner of its features",
+                    );
+                }
+                gains.iter().collect()
+            }
+            _ => {
+                return refuse(
+                    "controller.schedule",
+                    "does not fit the plant",
+                    "constant exactly if it has no parameter",
+                );
+            }
+        };
+        let key = |k: usize| match &controller.schedule {
+            Schedule::Constant { .. } => "controller.schedule.gain".to_owned(),
+            _ => format!("controller.schedule.gains[{k}]"),
+        };
+        gains.iter().enumerate().try_for_each(|(k, gain)| shape(&key(k), gain, m, n))?;
+
+        // the schedule flies, the points say where it came from: they may differ by what the design says, no more
+        let scale = self.points.iter().map(|point| point.gain.norm_max()).fold(0.0, f64::max);
+        let difference = |point: &FrozenDesign| (controller.schedule.gain_matrix(point.rho) - &point.gain).norm_max();
+        let found = self.points.iter().map(difference).fold(0.0, f64::max);
+        if found > self.schedule_error * (1.0 + SAME) + SAME * scale {
+            let found = format!("differs from points[].gain by {found:.3e}");
+            return refuse(
+                "controller.schedule",
+                found,
+                format!("within schedule_error = {:.3e}", self.schedule_error),
+            );
+        }
+        Ok(())
+    }
+}
+
+fn shape(key: &str, matrix: &Mat<f64>, rows: usize, columns: usize) -> Result<(), DesignError> {
+    if (matrix.nrows(), matrix.ncols()) != (rows, columns) {
+        return refuse(key, format!("is {} × {}", matrix.nrows(), matrix.ncols()), format!("{rows} × {columns}"));
+    }
+    if is_finite(matrix) { Ok(()) } else { refuse(key, "has an entry that is not finite", "finite") }
+}
+
+fn definite(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(), DesignError> {
+    shape(key, matrix, size, size)?;
+    match is_symmetric(matrix, SAME) && inverse_spd(matrix).is_some() {
+        true => Ok(()),
+        false => refuse(key, "is not symmetric positive definite", "so"),
+    }
+}
+
+/// The grid has to be the plant's of as many points, which a design covers its whole range with.
+fn same_grid(key: &str, found: &[f64], scheduling: Option<&Scheduling>) -> Result<(), DesignError> {
+    let expected = parameter_grid(scheduling, found.len());
+    let is_same = expected.len() == found.len()
+        && expected.iter().zip(found).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()));
+    if is_same { Ok(()) } else { refuse(key, "is not the plant's grid", "equidistant over the range of its parameter") }
+}
