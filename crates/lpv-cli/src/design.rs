@@ -3,7 +3,7 @@
 use crate::designs::{self, DesignSummary};
 use crate::failure::Failure;
 use crate::folder::ResultFolder;
-use crate::output::print;
+use crate::output::{OutputArguments, print};
 use crate::run::required_verdicts;
 use crate::scenario::Scenario;
 use clap::Args;
@@ -14,28 +14,19 @@ use std::path::PathBuf;
 pub struct DesignArguments {
     /// Scenario file
     scenario: PathBuf,
-    /// Folder for the designs [default: out/<name of the scenario>-designs]
-    #[arg(long, short)]
-    out: Option<PathBuf>,
-    /// Replace earlier designs
-    #[arg(long)]
-    force: bool,
-    /// Print a summary of the designs as JSON instead of text
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 /// Design every controller of the scenario.
 pub fn run(arguments: &DesignArguments) -> Result<(), Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
-    let place = arguments.out.clone().unwrap_or_else(|| scenario.designs_folder());
-    let folder = ResultFolder::begin(&place, arguments.force)?;
+    let place = arguments.output.out.clone().unwrap_or_else(|| scenario.designs_folder());
+    let folder = ResultFolder::begin(&place, arguments.output.force)?;
     let checked = designs::design_all(&scenario)?;
-    for checked in &checked {
-        folder.write(&designs::file_name(&checked.design.name), &designs::to_json(&checked.design)?)?;
-    }
+    designs::write_all(&scenario, &checked, &folder)?;
     let place = folder.finish()?;
-    if arguments.json {
+    if arguments.output.json {
         let summaries: Vec<DesignSummary> = checked.iter().map(|checked| checked.summary()).collect();
         let json = serde_json::to_string_pretty(&summaries).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;

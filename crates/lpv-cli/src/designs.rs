@@ -1,6 +1,7 @@
 //! Designs of a scenario: synthesis with progress, checks, JSON files.
 
 use crate::failure::Failure;
+use crate::folder::ResultFolder;
 use crate::progress;
 use crate::scenario::{Scenario, engineers_words};
 use lpv::certificate::{Claim, Verdict, check};
@@ -116,9 +117,17 @@ fn design_one(scenario: &Scenario, request: &DesignRequest) -> Result<CheckedDes
     Ok(CheckedDesign { design, claims, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
 }
 
-/// The JSON file of a design.
-pub fn to_json(design: &Design) -> Result<Vec<u8>, Failure> {
-    let mut json = serde_json::to_vec(design).map_err(|error| Failure::serialisation(&error))?;
+/// Write the LPV model and the designs on it.
+pub fn write_all(scenario: &Scenario, checked: &[CheckedDesign], folder: &ResultFolder) -> Result<(), Failure> {
+    folder.write("model.json", &to_json(&scenario.model)?)?;
+    for checked in checked {
+        folder.write(&file_name(&checked.design.name), &to_json(&checked.design)?)?;
+    }
+    Ok(())
+}
+
+fn to_json(data: &impl Serialize) -> Result<Vec<u8>, Failure> {
+    let mut json = serde_json::to_vec(data).map_err(|error| Failure::serialisation(&error))?;
     json.push(b'\n');
     Ok(json)
 }

@@ -116,7 +116,7 @@ impl ResultFolder {
 /// Whether a file of this name is one that this program writes.
 fn is_result(name: &str) -> bool {
     let is = |start: &str, end: &str| name.starts_with(start) && name.ends_with(end);
-    ["run.json", "report.html"].contains(&name) || is("design-", ".json") || is("trajectory-", ".csv")
+    ["run.json", "report.html", "model.json"].contains(&name) || is("design-", ".json") || is("trajectory-", ".csv")
 }
 
 impl Drop for ResultFolder {

@@ -1,8 +1,23 @@
-//! Results on standard output.
+//! Results on standard output, and the arguments that say where results go.
 
 use crate::failure::Failure;
+use clap::Args;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Where results go, and in which form they are printed.
+#[derive(Args)]
+pub struct OutputArguments {
+    /// Folder for the results [default: under out/, named after the scenario]
+    #[arg(long, short)]
+    pub out: Option<PathBuf>,
+    /// Replace an earlier result
+    #[arg(long)]
+    pub force: bool,
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Write `text` to standard output, with a line break at its end. A reader that has gone away has had enough: that is no
 /// failure (`lpv certify … | head -1`).

@@ -4,7 +4,7 @@ use crate::designs::{self, CheckedDesign};
 use crate::failure::Failure;
 use crate::flights;
 use crate::folder::ResultFolder;
-use crate::output::print;
+use crate::output::{OutputArguments, print};
 use crate::record::{RunRecord, trajectory_csv, trajectory_file_name};
 use crate::scenario::Scenario;
 use crate::{report, table};
@@ -18,30 +18,22 @@ use std::time::Instant;
 pub struct RunArguments {
     /// Scenario file
     scenario: PathBuf,
-    /// Folder for the results [default: out/<name of the scenario>]
-    #[arg(long, short)]
-    out: Option<PathBuf>,
-    /// Replace an earlier result
-    #[arg(long)]
-    force: bool,
-    /// Print the record of the run as JSON instead of the table
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 /// Do the whole job.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let scenario = Scenario::read(&arguments.scenario)?;
-    let folder = ResultFolder::begin(&scenario.result_folder(arguments.out.as_deref()), arguments.force)?;
+    let folder = ResultFolder::begin(&scenario.result_folder(arguments.output.out.as_deref()), arguments.output.force)?;
     let checked = designs::design_all(&scenario)?;
     let plain: Vec<_> = checked.iter().map(|checked| checked.design.clone()).collect();
     let flown = flights::fly_all(&scenario, &plain);
 
-    for ((plan, checked), flown) in scenario.controllers.iter().zip(&checked).zip(&flown) {
-        let name = &plan.request.name;
-        folder.write(&designs::file_name(name), &designs::to_json(&checked.design)?)?;
-        folder.write(&trajectory_file_name(name), trajectory_csv(&scenario, flown).as_bytes())?;
+    designs::write_all(&scenario, &checked, &folder)?;
+    for (plan, flown) in scenario.controllers.iter().zip(&flown) {
+        folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
     }
     folder.write("report.html", report::html(&scenario, &checked, &flown)?.as_bytes())?;
     let seconds = started.elapsed().as_secs_f64();
@@ -49,7 +41,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     folder.write("run.json", record.as_bytes())?;
     let place = folder.finish()?;
 
-    if arguments.json {
+    if arguments.output.json {
         print(&record)?;
     } else {
         print(&format!(

@@ -1,26 +1,29 @@
 //! Scenario files: TOML → plain values → ready objects. Everything that can be wrong with a file is met here, with the
 //! file, the key, the value and what is allowed.
 
+mod controller;
+mod door;
 mod file;
+mod set_point;
 mod weights;
 
 use crate::failure::Failure;
+use controller::{RequestDefaults, controller};
+use door::Door;
+use file::ScenarioFile;
 pub use file::engineers_words;
-use file::{ControllerTable, ScenarioFile};
-use lpv::controller::InputLimits;
 use lpv::estimator::NoiseCovariance;
 use lpv::math::eigen::unstabilizable_mode;
-use lpv::model::GridModel;
+use lpv::model::{GridModel, LpvModel};
 use lpv::plant::{Description, Plant, PlantSpec};
-use lpv::sim::{FARTHEST, Reference, SetPoint};
-use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method};
+use lpv::sim::{Reference, SetPoint};
+use lpv::synthesis::{CostWeights, DesignRequest};
+use set_point::{set_point, state_value};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Numbers that the flights of a scenario may keep in memory: 0.8 GB.
 const MOST_NUMBERS: f64 = 1e8;
-/// Inputs that the high-gain method is meant for: it poses 2^m inequalities.
-const MOST_HIGH_GAIN_INPUTS: usize = 10;
 /// Characters of a name that becomes part of a file name; file systems allow 255.
 const LONGEST_NAME: usize = 100;
 /// Bytes of a file that is read: a design of thousands of grid points has tens of megabytes.
@@ -40,6 +43,8 @@ pub struct Scenario {
     pub plant_spec: PlantSpec,
     /// The plant.
     pub plant: Box<dyn Plant>,
+    /// The LPV model that the controllers are designed on.
+    pub model: LpvModel,
     /// Cost weights.
     pub weights: CostWeights,
     /// Initial state.
@@ -78,31 +83,6 @@ pub struct ControllerPlan {
     pub require: Option<lpv::certificate::Verdict>,
 }
 
-/// Where a value stands, for messages.
-struct Door<'a> {
-    file: &'a Path,
-}
-
-impl Door<'_> {
-    fn refuse<T>(&self, key: impl Into<String>, message: impl Into<String>) -> Result<T, Failure> {
-        Err(Failure::BadInput { file: self.file.to_owned(), key: key.into(), message: message.into() })
-    }
-
-    fn positive(&self, key: &str, value: f64) -> Result<f64, Failure> {
-        match value.is_finite() && value > 0.0 {
-            true => Ok(value),
-            false => self.refuse(key, format!("is {value}: it has to be a positive, finite number")),
-        }
-    }
-
-    fn finite(&self, key: &str, value: f64) -> Result<f64, Failure> {
-        match value.is_finite() {
-            true => Ok(value),
-            false => self.refuse(key, format!("is {value}: it has to be finite")),
-        }
-    }
-}
-
 impl Scenario {
     /// Read and check the scenario at `path`.
     pub fn read(path: &Path) -> Result<Self, Failure> {
@@ -127,7 +107,8 @@ impl Scenario {
             r: weights::definite(&door, "weights.R", file.weights.r, file.weights.r_diag, m)?,
         };
         let grid_points = grid_points(&door, file.model.grid_points, &*plant)?;
-        stabilizable(&door, &GridModel::of_plant(&*plant, grid_points))?;
+        let model = LpvModel::of_plant(&plant_spec, &*plant, grid_points);
+        stabilizable(&door, &model.grid)?;
 
         let simulation = file.simulation;
         let duration_s = door.positive("simulation.duration_s", simulation.duration_s)?;
@@ -239,6 +220,7 @@ impl Scenario {
             description: file.description,
             text,
             plant_spec,
+            model,
             weights,
             initial_state,
             reference,
@@ -330,263 +312,4 @@ fn stabilizable(door: &Door, model: &GridModel) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// `name = value` or `name_deg = value` for a state of the plant.
-fn state_value(
-    door: &Door,
-    key: &str,
-    description: &Description,
-    name: &str,
-    value: &toml::Value,
-) -> Result<(usize, f64), Failure> {
-    let number = match value {
-        toml::Value::Float(value) => *value,
-        toml::Value::Integer(value) => *value as f64,
-        other => {
-            return door.refuse(key, format!("is of type {}: it has to be a number", other.type_str()));
-        }
-    };
-    let number = door.finite(key, number)?;
-    let in_degrees = name.strip_suffix("_deg").and_then(|name| description.state(name));
-    let in_range = |state: usize, value: f64| {
-        let limit = description.state_limits[state].map_or(FARTHEST, |limit| limit.min(FARTHEST));
-        match value.abs() < limit {
-            true => Ok((state, value)),
-            false => door.refuse(
-                key,
-                format!(
-                    "is {value:e} {unit}: allowed are values between -{limit} and {limit} {unit}",
-                    limit = (limit * 1e6).round() / 1e6,
-                    unit = description.states[state].unit
-                ),
-            ),
-        }
-    };
-    match (description.state(name), in_degrees) {
-        (Some(state), _) => in_range(state, number),
-        (None, Some(state)) if description.states[state].unit == "rad" => in_range(state, number.to_radians()),
-        _ => {
-            let names: Vec<String> = (description.states.iter())
-                .map(|signal| match signal.unit.as_str() {
-                    "rad" => format!("{0}, {0}_deg", signal.name),
-                    _ => signal.name.clone(),
-                })
-                .collect();
-            door.refuse(key, format!("is not a state of the plant; allowed are {}", names.join(", ")))
-        }
-    }
-}
-
-fn set_point(
-    door: &Door,
-    key: &str,
-    description: &Description,
-    table: &toml::Table,
-    last_sample_s: f64,
-) -> Result<(SetPoint, String), Failure> {
-    let (mut time_s, mut label, mut targets) = (None, None, Vec::new());
-    for (name, value) in table {
-        let key = format!("{key}.{name}");
-        match (name.as_str(), value) {
-            ("time_s", toml::Value::Float(time)) => time_s = Some(*time),
-            ("time_s", toml::Value::Integer(time)) => time_s = Some(*time as f64),
-            ("label", toml::Value::String(text)) => label = Some(text.clone()),
-            ("time_s" | "label", other) => {
-                let expected = if name == "label" { "a string" } else { "a number of seconds" };
-                return door.refuse(key, format!("is of type {}: it has to be {expected}", other.type_str()));
-            }
-            _ => targets.push(state_value(door, &key, description, name, value)?),
-        }
-    }
-    let Some(time_s) = time_s else {
-        return door.refuse(format!("{key}.time_s"), "is missing: say when the set point takes effect, in seconds");
-    };
-    if !(0.0..last_sample_s).contains(&time_s) {
-        return door.refuse(
-            format!("{key}.time_s"),
-            format!("is {time_s}: it has to lie in the flight, from 0 to below {last_sample_s} s"),
-        );
-    }
-    if targets.is_empty() {
-        let example = &description.states[0].name;
-        return door.refuse(key, format!("moves no state; give at least one, such as {example} = 1.0"));
-    }
-    if let Some(name) = table.keys().find(|name| table.contains_key(&format!("{name}_deg"))) {
-        return door.refuse(format!("{key}.{name}"), format!("{name} and {name}_deg are both given; keep one"));
-    }
-    let spell = |&(state, value): &(usize, f64)| {
-        let signal = &description.states[state];
-        match signal.unit.as_str() {
-            "rad" => format!("{} = {}°", signal.name, (value.to_degrees() * 1e6).round() / 1e6),
-            unit => format!("{} = {value} {unit}", signal.name),
-        }
-    };
-    let label = label.unwrap_or_else(|| targets.iter().map(spell).collect::<Vec<_>>().join(", "));
-    Ok((SetPoint { time_s, targets }, label))
-}
-
-/// What every controller of a scenario shares.
-struct RequestDefaults<'a> {
-    weights: &'a CostWeights,
-    grid_points: usize,
-    sample_time_s: f64,
-    limits: Option<&'a file::LimitsTable>,
-    description: &'a Description,
-    operating_input: &'a [f64],
-}
-
-fn controller(
-    door: &Door,
-    key: &str,
-    table: ControllerTable,
-    defaults: &RequestDefaults,
-    has_noise: bool,
-) -> Result<ControllerPlan, Failure> {
-    file_name_part(door, &format!("{key}.name"), &table.name)?;
-    if table.unlimited && table.limits.is_some() {
-        return door.refuse(format!("{key}.unlimited"), "contradicts the limits of this controller; keep one");
-    }
-    let label = table.label.unwrap_or_else(|| table.name.clone());
-    if label.chars().any(char::is_control) {
-        return door.refuse(
-            format!("{key}.label"),
-            "has a line break or another control character: it has to fit into a line of a table",
-        );
-    }
-    let limits = match (table.unlimited, table.limits.as_ref().or(defaults.limits)) {
-        (true, _) | (false, None) => InputLimits::none(defaults.operating_input.len()),
-        (false, Some(limits)) => {
-            let place = if table.limits.is_some() { format!("{key}.limits") } else { "limits".into() };
-            input_limits(door, &place, limits, defaults)?
-        }
-    };
-    let gamma = match table.gamma {
-        Some(gamma) => Some(door.positive(&format!("{key}.gamma"), gamma)?),
-        None => None,
-    };
-    let method = match (table.method, gamma) {
-        (file::MethodName::Lpvqr, None) => Method::Lpvqr,
-        (file::MethodName::Lpvqr, Some(_)) => {
-            return door.refuse(
-                format!("{key}.gamma"),
-                "method \"lpvqr\" knows no γ; remove it, or choose \"slpvqr\" or \"high-gain-slpvqr\"",
-            );
-        }
-        (_, None) => {
-            return door.refuse(
-                format!("{key}.gamma"),
-                "is missing: the saturated methods need the level γ > 0 of their certified set",
-            );
-        }
-        (file::MethodName::Slpvqr, Some(gamma)) => Method::Slpvqr { gamma },
-        (file::MethodName::HighGainSlpvqr, Some(gamma)) => {
-            let high_gain = table.high_gain.unwrap_or_default();
-            check_high_gain(door, &format!("{key}.high_gain"), &high_gain)?;
-            Method::HighGainSlpvqr { gamma, high_gain }
-        }
-    };
-    if table.high_gain.is_some() && !matches!(method, Method::HighGainSlpvqr { .. }) {
-        return door.refuse(format!("{key}.high_gain"), "belongs to method \"high-gain-slpvqr\" only");
-    }
-    if let Some(gamma) = method.gamma() {
-        let Some(sigma) = limits.symmetric_bound(defaults.operating_input) else {
-            return door.refuse(
-                format!("{key}.limits"),
-                "a saturated method needs a limit on every input; give [limits] min and max",
-            );
-        };
-        if !sigma.iter().all(|sigma| (sigma * sigma / gamma).is_normal()) {
-            return door.refuse(
-                format!("{key}.gamma"),
-                format!("is {gamma:e}: limit²/γ is too large or too small a number to calculate with"),
-            );
-        }
-    }
-    let inputs = defaults.operating_input.len();
-    if matches!(method, Method::HighGainSlpvqr { .. }) && inputs > MOST_HIGH_GAIN_INPUTS {
-        return door.refuse(
-            format!("{key}.method"),
-            format!("\"high-gain-slpvqr\" is for up to {MOST_HIGH_GAIN_INPUTS} inputs, because it has 2^m inequalities for m of them; the plant has {inputs}: choose \"slpvqr\""),
-        );
-    }
-    if (table.noise || table.estimator.is_some()) && !has_noise {
-        return door.refuse(format!("{key}.noise"), "the scenario has no [noise] table to take covariances from");
-    }
-    if table.estimator.is_some() && !table.noise {
-        return door.refuse(format!("{key}.estimator"), "an estimator needs measurements: set noise = true");
-    }
-    Ok(ControllerPlan {
-        label,
-        request: DesignRequest {
-            name: table.name,
-            method,
-            weights: defaults.weights.clone(),
-            grid_points: defaults.grid_points,
-            schedule: table.schedule,
-            limits,
-            sample_time_s: defaults.sample_time_s,
-        },
-        noise: table.noise,
-        estimator: table.estimator.is_some(),
-        require: table.require,
-    })
-}
-
-fn check_high_gain(door: &Door, key: &str, options: &HighGainOptions) -> Result<(), Failure> {
-    if !(options.recovery >= 0.0 && options.recovery.is_finite()) {
-        return door.refuse(
-            format!("{key}.recovery"),
-            format!("is {}: it has to be a fraction, zero or more", options.recovery),
-        );
-    }
-    if !(options.gain_margin >= 1.0 && options.gain_margin.is_finite()) {
-        return door.refuse(
-            format!("{key}.gain_margin"),
-            format!("is {}: it has to be a factor of at least 1", options.gain_margin),
-        );
-    }
-    Ok(())
-}
-
-fn input_limits(
-    door: &Door,
-    key: &str,
-    table: &file::LimitsTable,
-    defaults: &RequestDefaults,
-) -> Result<InputLimits, Failure> {
-    let m = defaults.operating_input.len();
-    // a limit of -∞ below or ∞ above is none
-    let limit = |side: &str, value: f64| {
-        let none = if side == "min" { f64::NEG_INFINITY } else { f64::INFINITY };
-        Some(value).filter(|&value| value != none)
-    };
-    let spread = |side: &str, bound: &Option<file::Bound>| match bound {
-        None => Ok(vec![None; m]),
-        Some(file::Bound::All(value)) => Ok(vec![limit(side, *value); m]),
-        Some(file::Bound::Each(values)) if values.len() == m => {
-            Ok(values.iter().map(|&value| limit(side, value)).collect())
-        }
-        Some(file::Bound::Each(values)) => {
-            door.refuse(format!("{key}.{side}"), format!("has {} numbers: the plant has {m} inputs", values.len()))
-        }
-    };
-    let limits = InputLimits { min: spread("min", &table.min)?, max: spread("max", &table.max)? };
-    for (i, (&operating, signal)) in defaults.operating_input.iter().zip(&defaults.description.inputs).enumerate() {
-        let outside = |side: &str, bound: f64| {
-            door.refuse(
-                format!("{key}.{side}"),
-                format!(
-                    "is {bound:?} for {}: the limits exclude the operating input {operating} {}, at which the plant rests; it has to lie strictly between min and max",
-                    signal.name, signal.unit
-                ),
-            )
-        };
-        match (limits.min[i], limits.max[i]) {
-            (Some(min), _) if min.is_nan() || min >= operating => return outside("min", min),
-            (_, Some(max)) if max.is_nan() || max <= operating => return outside("max", max),
-            _ => {}
-        }
-    }
-    Ok(limits)
 }

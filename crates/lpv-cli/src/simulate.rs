@@ -4,7 +4,7 @@ use crate::designs;
 use crate::failure::Failure;
 use crate::flights::{self, Flown};
 use crate::folder::ResultFolder;
-use crate::output::print;
+use crate::output::{OutputArguments, print};
 use crate::record::{trajectory_csv, trajectory_file_name};
 use crate::scenario::{Scenario, read_text};
 use clap::Args;
@@ -19,18 +19,11 @@ use std::path::PathBuf;
 pub struct SimulateArguments {
     /// Scenario file
     scenario: PathBuf,
-    /// Folder that holds design-<name>.json for each controller [default: where `lpv design` or else `lpv run` wrote them]
+    /// Folder that holds design-NAME.json for each controller [default: where `lpv design` or else `lpv run` wrote them]
     #[arg(long)]
     designs: Option<PathBuf>,
-    /// Folder for the trajectories [default: out/<name of the scenario>-flights]
-    #[arg(long, short)]
-    out: Option<PathBuf>,
-    /// Replace earlier trajectories
-    #[arg(long)]
-    force: bool,
-    /// Print the results as JSON instead of text
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 #[derive(Serialize)]
@@ -74,14 +67,14 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         }
         loaded.push(design);
     }
-    let place = arguments.out.clone().unwrap_or_else(|| scenario.flights_folder());
-    let folder = ResultFolder::begin(&place, arguments.force)?;
+    let place = arguments.output.out.clone().unwrap_or_else(|| scenario.flights_folder());
+    let folder = ResultFolder::begin(&place, arguments.output.force)?;
     let flown = flights::fly_all(&scenario, &loaded);
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {
         folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
     }
     let place = folder.finish()?;
-    if arguments.json {
+    if arguments.output.json {
         let summaries: Vec<FlightSummary> =
             scenario.controllers.iter().zip(&flown).map(|(plan, flown)| summary(&plan.request.name, flown)).collect();
         let json = serde_json::to_string_pretty(&summaries).map_err(|error| Failure::serialisation(&error))?;

@@ -1,6 +1,6 @@
 //! The TOML tables of a scenario, as they stand in the file.
 
-use super::Door;
+use super::door::Door;
 use crate::failure::Failure;
 use lpv::certificate::Verdict;
 use lpv::plant::{LinearParameters, PlantSpec, QuadrotorParameters};

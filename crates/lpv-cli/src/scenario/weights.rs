@@ -1,6 +1,6 @@
 //! Symmetric matrices of a scenario: weights and covariances.
 
-use super::Door;
+use super::door::Door;
 use super::file::{Diagonal, Rows};
 use crate::failure::Failure;
 use lpv::math::Mat;

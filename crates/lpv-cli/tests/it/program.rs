@@ -186,6 +186,11 @@ impl Place {
         names.sort();
         names
     }
+
+    /// The names of the designs in the folder `name`, in order.
+    pub fn designs(&self, name: &str) -> Vec<String> {
+        self.list(name).into_iter().filter(|name| name.starts_with("design-")).collect()
+    }
 }
 
 fn collect(folder: &Path, prefix: &str, files: &mut BTreeMap<String, Vec<u8>>) {

@@ -3,6 +3,8 @@
 use crate::program::{DOUBLE_INTEGRATOR, Place, QUADROTOR, edited};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
 
 /// The data inside a report page.
 fn report_data(page: &str) -> Value {
@@ -60,6 +62,7 @@ fn writes_a_whole_result() {
             "design-high-gain.json",
             "design-regulator.json",
             "design-saturated.json",
+            "model.json",
             "report.html",
             "run.json",
             "trajectory-filtered.csv",
@@ -323,4 +326,18 @@ fn a_full_disk_behind_standard_output_is_told() {
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output = place.command("run scenario.toml --json").stdout(full).output().unwrap();
     crate::program::Ended::from(output).refuses(2, &["standard output"]);
+}
+
+/// Every scenario that comes with the program runs, and none of its designs is refuted.
+#[test]
+fn shipped_scenarios_run() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+    let mut count = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let text = fs::read_to_string(entry.unwrap().path()).unwrap();
+        let place = Place::with(&text);
+        place.succeed("run scenario.toml");
+        count += 1;
+    }
+    assert!(count >= 2);
 }

@@ -56,7 +56,7 @@ fn certify_checks_every_saved_design() {
     for scenario in [DOUBLE_INTEGRATOR, QUADROTOR] {
         let place = Place::with(scenario);
         place.succeed("design scenario.toml --out designs");
-        for file in place.list("designs") {
+        for file in place.designs("designs") {
             let text = place.succeed(&format!("certify designs/{file}"));
             assert!(text.contains(": numerical\n"), "{text}");
             let certificate = parsed(&place.succeed(&format!("certify designs/{file} --json")));
@@ -96,7 +96,7 @@ fn a_negated_gain_is_refuted() {
     for scenario in [DOUBLE_INTEGRATOR, QUADROTOR] {
         let place = Place::with(scenario);
         place.succeed("design scenario.toml --out designs");
-        for file in place.list("designs") {
+        for file in place.designs("designs") {
             let mut design = place.json(&format!("designs/{file}"));
             let schedule = design.pointer_mut("/controller/schedule").unwrap();
             let gain = if schedule["gain"].is_array() { "gain" } else { "gains" };

@@ -140,7 +140,7 @@ impl Simulation<'_> {
             let t_s = k as f64 * self.sample_time_s;
             if let Some(state) = (0..n).find(|&i| {
                 let limit = description.state_limits[i].unwrap_or(FARTHEST).min(FARTHEST);
-                !(z[i].abs() < limit) // true for NaN too
+                z[i].is_nan() || z[i].abs() >= limit
             }) {
                 outcome = Outcome::Diverged { time_s: t_s, state, value: z[state] };
                 break;

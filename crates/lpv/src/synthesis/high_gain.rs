@@ -88,7 +88,7 @@ pub(super) fn segment(
         problem.positive_definite(&name, performance(&y, &mixture(vertex, &l, &m), model, &inverse));
     }
     for (i, &bound) in sigma.iter().enumerate() {
-        problem.positive_definite(&format!("input {} unsaturated", i + 1), unsaturated(&y, m.row(i), bound, gamma));
+        problem.positive_definite(format!("input {} unsaturated", i + 1), unsaturated(&y, m.row(i), bound, gamma));
     }
     problem.maximize(&y.trace());
     let answer = solve(&problem, model.rho)?;

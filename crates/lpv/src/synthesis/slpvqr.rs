@@ -20,7 +20,7 @@ pub(super) fn frozen(
     let l = problem.rectangular("L", m, n);
     problem.positive_definite("performance", performance(&y, &l, model, &InverseWeights::new(weights)));
     for (i, &bound) in sigma.iter().enumerate() {
-        problem.positive_definite(&format!("input {} unsaturated", i + 1), unsaturated(&y, l.row(i), bound, gamma));
+        problem.positive_definite(format!("input {} unsaturated", i + 1), unsaturated(&y, l.row(i), bound, gamma));
     }
     problem.maximize(&y.trace());
     let answer = solve(&problem, model.rho)?;
