@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output::print;
 use crate::scenario::read_text;
 use clap::Args;
-use lpv::certificate::{Claim, Verdict, check};
+use lpv::certificate::{BlockMargin, Claim, Verdict, block_margins, check};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -24,6 +24,8 @@ struct Certificate<'a> {
     design: &'a str,
     verdict: Verdict,
     claims: &'a [Claim],
+    /// λ_min of every block of every inequality.
+    blocks: Vec<BlockMargin>,
 }
 
 /// Check the design; anything worse than `numerical` is a failure.
@@ -36,7 +38,8 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     let claims = check(&design, &*plant);
     let verdict = designs::worst(&claims);
     if arguments.json {
-        let certificate = Certificate { design: &design.name, verdict, claims: &claims };
+        let blocks = block_margins(&design, &*plant);
+        let certificate = Certificate { design: &design.name, verdict, claims: &claims, blocks };
         let json = serde_json::to_string_pretty(&certificate).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;
     } else {

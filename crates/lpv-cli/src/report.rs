@@ -232,7 +232,7 @@ fn estimation_errors(description: &Description, shown: &[usize], trajectory: &Tr
     let errors: Vec<Vec<f64>> = (trajectory.estimates.iter().zip(&trajectory.states))
         .map(|(estimate, state)| {
             let mut error = vec![0.0; state.len()];
-            description.state_error(estimate, state, &mut error);
+            description.state_error(state, estimate, &mut error);
             error
         })
         .collect();

@@ -3,49 +3,53 @@
 use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
 use crate::math::matrix::{inverse_spd, symmetric_part};
-use crate::model::FrozenModel;
+use crate::model::{FrozenModel, linearize};
+use crate::plant::Plant;
 use crate::synthesis::{Design, FrozenDesign};
 use serde::Serialize;
 
 /// λ_min of one block.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlockMargin {
+    /// Parameter value of the grid point.
+    pub parameter: f64,
     /// Which inequality.
     pub name: String,
     /// Its smallest eigenvalue, NaN when P is not positive definite.
     pub smallest_eigenvalue: f64,
 }
 
-/// λ_min of every block of the inequalities at one grid point of a design: (4.36) for LPVQR; (5.18), (5.19) for SLPVQR;
+/// λ_min of every block of the inequalities of a design at every grid point: (4.36) for LPVQR; (5.18), (5.19) for SLPVQR;
 /// (5.20) for all 2^m mixtures and (5.21) for high gain.
 ///
-/// The blocks are in Y = P⁻¹ and L = KY, as printed, with the K that flies: the schedule's, not the point's. `model` is the
-/// linearisation at the point's parameter.
-pub fn block_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> Vec<BlockMargin> {
-    let mut margins = vec![BlockMargin { name: "P".into(), smallest_eigenvalue: smallest_eigenvalue(&point.p) }];
+/// The blocks are in Y = P⁻¹ and L = KY, as printed, with the K that flies: the schedule's, not the point's.
+pub fn block_margins(design: &Design, plant: &dyn Plant) -> Vec<BlockMargin> {
+    let margins = |point: &FrozenDesign| point_margins(design, point, &linearize(plant, point.rho));
+    design.points.iter().flat_map(margins).collect()
+}
+
+/// The margins at one grid point; `model` is the linearisation there.
+fn point_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> Vec<BlockMargin> {
+    let block = |name: String, smallest_eigenvalue| BlockMargin { parameter: point.rho, name, smallest_eigenvalue };
+    let mut margins = vec![block("P".into(), smallest_eigenvalue(&point.p))];
     let gain = design.controller.schedule.gain_matrix(point.rho);
     let inverses = (inverse_spd(&point.p), inverse_spd(&design.weights.q), inverse_spd(&design.weights.r));
     let (Some(y), Some(q_inverse), Some(r_inverse)) = inverses else {
-        margins.push(BlockMargin { name: "P, Q, R invertible".into(), smallest_eigenvalue: f64::NAN });
+        margins.push(block("P, Q, R invertible".into(), f64::NAN));
         return margins;
     };
     let performance = |gain: &Mat<f64>| performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
 
     match &point.auxiliary_gain {
-        None => margins.push(BlockMargin {
-            name: "performance".into(),
-            smallest_eigenvalue: smallest_eigenvalue(&performance(&gain)),
-        }),
+        None => margins.push(block("performance".into(), smallest_eigenvalue(&performance(&gain)))),
         Some(auxiliary) => {
             let inputs = gain.nrows();
             margins.extend((0..1usize << inputs).map(|vertex| {
                 let mixture = Mat::from_fn(inputs, gain.ncols(), |i, j| {
                     if vertex >> i & 1 == 1 { gain[(i, j)] } else { auxiliary[(i, j)] }
                 });
-                BlockMargin {
-                    name: format!("performance of mixture {vertex:0inputs$b}"),
-                    smallest_eigenvalue: smallest_eigenvalue(&performance(&mixture)),
-                }
+                let name = format!("performance of mixture {vertex:0inputs$b}");
+                block(name, smallest_eigenvalue(&performance(&mixture)))
             }));
         }
     }
@@ -54,9 +58,9 @@ pub fn block_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel)
         (design.method.gamma(), limits.symmetric_bound(&design.controller.operating_input))
     {
         let unsaturated = point.auxiliary_gain.as_ref().unwrap_or(&gain) * &y;
-        margins.extend(sigma.iter().enumerate().map(|(i, bound)| BlockMargin {
-            name: format!("input {} unsaturated", i + 1),
-            smallest_eigenvalue: smallest_eigenvalue(&unsaturated_block(&y, &unsaturated, i, bound * bound / gamma)),
+        margins.extend(sigma.iter().enumerate().map(|(i, bound)| {
+            let matrix = unsaturated_block(&y, &unsaturated, i, bound * bound / gamma);
+            block(format!("input {} unsaturated", i + 1), smallest_eigenvalue(&matrix))
         }));
     }
     margins

@@ -12,7 +12,6 @@ pub use inequality::{BlockMargin, block_margins};
 pub use region::{StepBound, StepConditions, UnmetCondition, step_bound, unsaturated_level};
 pub use stability::{StabilityMargin, frozen_stability};
 
-use crate::model::linearize;
 use crate::plant::Plant;
 use crate::synthesis::Design;
 use serde::{Deserialize, Serialize};
@@ -97,27 +96,23 @@ pub fn check(design: &Design, plant: &dyn Plant) -> Vec<Claim> {
 }
 
 fn inequalities_claim(design: &Design, plant: &dyn Plant) -> Claim {
-    let margins: Vec<(f64, BlockMargin)> = (design.points.iter())
-        .flat_map(|point| {
-            let model = linearize(plant, point.rho);
-            block_margins(design, point, &model).into_iter().map(|block| (point.rho, block))
-        })
-        .collect();
+    let margins = block_margins(design, plant);
     let claim = "matrix inequalities hold at every grid point".to_string();
-    let worst = margins.iter().min_by(|a, b| nan_first(a.1.smallest_eigenvalue, b.1.smallest_eigenvalue));
+    let worst = margins.iter().min_by(|a, b| nan_first(a.smallest_eigenvalue, b.smallest_eigenvalue));
     match worst {
         None => {
             Claim { claim, verdict: Verdict::Undecided, margin: f64::NAN, detail: "the design has no points".into() }
         }
-        Some((rho, block)) => Claim {
+        Some(block) => Claim {
             claim,
             verdict: if block.smallest_eigenvalue > 0.0 { Verdict::Numerical } else { Verdict::Refuted },
             margin: block.smallest_eigenvalue,
             detail: format!(
-                "least λ_min = {:.3e} of {} blocks, in \"{}\" at parameter {rho:.4}",
+                "least λ_min = {:.3e} of {} blocks, in \"{}\" at parameter {:.4}",
                 block.smallest_eigenvalue,
                 margins.len(),
-                block.name
+                block.name,
+                block.parameter
             ),
         },
     }
