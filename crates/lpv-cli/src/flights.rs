@@ -85,10 +85,10 @@ fn step_bounds(
         let bound = step_bound(design, scheduling, &conditions);
         let inside = match bound.level {
             None => "inputs are not limited, so the certified set is everything".to_owned(),
-            Some(level) if bound.is_inside() => format!("inside the certified set of level {level:.4}"),
+            Some(level) if bound.is_inside() => format!("inside the certified set of level {}", digits(level)),
             Some(level) => {
                 let cover = cover(scenario, design, step, level);
-                format!("outside the certified set of level {level:.4}{cover}")
+                format!("outside the certified set of level {}{cover}", digits(level))
             }
         };
         let others = bound.unmet.iter().filter_map(|condition| match condition {
@@ -102,7 +102,7 @@ fn step_bounds(
             UnmetCondition::Noise => Some("; noise acts, of which the bound knows nothing".into()),
         });
         let claim = Claim {
-            claim: format!("step {} at t = {} s costs at most {:.4}", k + 1, step.time_s, bound.bound),
+            claim: format!("step {} at t = {} s costs at most {}", k + 1, step.time_s, digits(bound.bound)),
             verdict: bound.verdict(),
             margin: bound.level.map_or(f64::INFINITY, |level| level - bound.bound),
             detail: inside + &others.collect::<String>(),
@@ -121,8 +121,13 @@ fn cover(scenario: &Scenario, design: &Design, step: &StepResponse, level: f64) 
     let from = design.method.gamma().unwrap_or(level);
     let model = linearize(&*scenario.plant, step.parameter);
     match covering_level(&model, &design.weights, &sigma, &step.error, from) {
-        Ok(Some(gamma)) => format!("; SLPVQR with γ = {gamma:.4} would cover it"),
+        Ok(Some(gamma)) => format!("; SLPVQR with γ = {} would cover it", digits(gamma)),
         Ok(None) => "; no γ up to 1e6 covers it".into(),
         Err(error) => format!("; which γ would cover it is not known: {error}"),
     }
+}
+
+/// Four decimals, or the exponent form where those would say nothing.
+fn digits(value: f64) -> String {
+    if value == 0.0 || (0.01..1e6).contains(&value.abs()) { format!("{value:.4}") } else { format!("{value:.3e}") }
 }
