@@ -40,6 +40,9 @@ pub enum Failure {
         /// Why.
         source: SynthesisError,
     },
+    /// A problem without an optimum.
+    #[error("{0}")]
+    NoOptimum(String),
     /// A required verdict was not reached.
     #[error("not certified as asked: {0}")]
     NotCertified(String),
@@ -62,7 +65,7 @@ impl Failure {
             | Failure::Output { .. }
             | Failure::Synthesis { source: SynthesisError::UnlimitedInput { .. }, .. } => 2,
             Failure::NotCertified(_) | Failure::Synthesis { source: SynthesisError::Inaccurate { .. }, .. } => 4,
-            Failure::Synthesis { .. } => 3,
+            Failure::NoOptimum(_) | Failure::Synthesis { .. } => 3,
         }
     }
 

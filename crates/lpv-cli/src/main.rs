@@ -16,6 +16,7 @@ mod record;
 mod report;
 mod run;
 mod scenario;
+mod sdp;
 mod simulate;
 mod table;
 
@@ -43,6 +44,8 @@ enum Command {
     Certify(certify::CertifyArguments),
     /// Fly saved designs through a scenario
     Simulate(simulate::SimulateArguments),
+    /// Solve a semidefinite program from an SDPA sparse file
+    Sdp(sdp::SdpArguments),
 }
 
 fn main() -> ExitCode {
@@ -51,6 +54,7 @@ fn main() -> ExitCode {
         Command::Design(arguments) => design::run(&arguments),
         Command::Certify(arguments) => certify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Sdp(arguments) => sdp::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

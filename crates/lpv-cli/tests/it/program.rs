@@ -239,3 +239,8 @@ pub fn edited(text: &str, from: &str, to: &str) -> String {
     assert_eq!(text.matches(from).count(), 1, "\"{from}\" stands once");
     text.replace(from, to)
 }
+
+/// JSON that the program printed.
+pub fn parsed(out: &str) -> Value {
+    serde_json::from_str(out).unwrap()
+}

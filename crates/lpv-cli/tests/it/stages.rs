@@ -1,13 +1,9 @@
 //! `lpv design`, `lpv certify` and `lpv simulate`, each from the files of the one before.
 
-use crate::program::{DOUBLE_INTEGRATOR, Place, QUADROTOR};
+use crate::program::{DOUBLE_INTEGRATOR, Place, QUADROTOR, parsed};
 use serde_json::Value;
 
 const NAMES: [&str; 4] = ["regulator", "saturated", "high-gain", "filtered"];
-
-fn parsed(out: &str) -> Value {
-    serde_json::from_str(out).unwrap()
-}
 
 #[test]
 fn the_stages_give_what_a_run_gives() {
