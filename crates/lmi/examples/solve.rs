@@ -28,9 +28,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let outcome = format!("{:?}", answer.outcome);
         let outcome = outcome.split('{').next().unwrap_or_default();
+        let proved = answer.blocks.iter().map(|block| block.verified_lower_bound).fold(f64::INFINITY, f64::min);
         let smallest = answer.blocks.iter().map(|block| block.smallest_eigenvalue).fold(f64::INFINITY, f64::min);
         println!(
-            "{path}: {outcome}, objective {:.9e}, dual {:.9e}, gap {:.1e}, residuals {:.1e} {:.1e}, smallest eigenvalue {smallest:.1e}, \
+            "{path}: {outcome}, objective {:.9e}, dual {:.9e}, gap {:.1e}, residuals {:.1e} {:.1e}, smallest eigenvalue {smallest:.1e}, proved {proved:.1e}, \
              {} iterations, {:.3} s",
             answer.objective,
             answer.dual_objective,

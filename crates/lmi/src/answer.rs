@@ -8,9 +8,9 @@ use serde::Serialize;
 #[derive(Clone, Debug, Serialize)]
 pub enum Outcome {
     /// Optimal: the relative duality gap is at most 1e-7 (by default it aims for 1e-9), the residuals are within
-    /// tolerance, and the smallest eigenvalue of every block, recomputed from the data as stated, is positive for
-    /// strict inequalities, at least the margin (up to rounding) where one was given, and for [`Sdp`](crate::sdpa::Sdp)
-    /// at least −tolerance·(1 + ‖F₀‖).
+    /// tolerance, and of every block, recomputed from the data as stated, a lower bound on the smallest eigenvalue is
+    /// **proved** ([`BlockReport::verified_lower_bound`]) that is positive for strict inequalities, at least the margin (up to rounding) where one
+    /// was given, and for [`Sdp`](crate::sdpa::Sdp) at least −tolerance·(1 + ‖F₀‖).
     Solved,
     /// No point satisfies all inequalities; the witness shows why.
     Infeasible(Witness),
@@ -29,9 +29,13 @@ pub struct Witness {
     /// `Z_b` for every inequality in the order stated, symmetric positive semidefinite.
     #[serde(serialize_with = "nested_rows")]
     pub multipliers: Vec<Mat<f64>>,
-    /// Largest `|Σ_b⟨F_{b,i}, Z_b⟩|` over i, recomputed. Zero in exact arithmetic; the witness excludes all x with
+    /// Proved upper bound on `|Σ_b⟨F_{b,i}, Z_b⟩|` over all i. Zero in exact arithmetic; the witness excludes all x with
     /// `Σ|xᵢ| < 1/residual`.
     pub residual: f64,
+    /// What the witness is proved to exclude, in sensible units: all x with `|xᵢ| ≤ excluded_radius · sᵢ`, where sᵢ is the unit of
+    /// xᵢ in the balanced problem, in which coefficients are about 1. At least 1e10; [`Outcome::Infeasible`] is not
+    /// claimed for less.
+    pub excluded_radius: f64,
     /// Smallest eigenvalue over all `Z_b`, recomputed. Not negative beyond rounding.
     pub smallest_eigenvalue: f64,
 }
@@ -59,7 +63,8 @@ pub enum InaccurateReason {
     Cancelled,
     /// Rounding errors stopped progress: the problem has no interior, or is badly conditioned.
     Stalled,
-    /// The solver converged, but a block recomputed from the data is not positive definite by its margin.
+    /// The solver converged, but what it found cannot be proved on the data as stated: a block is not positive definite by its margin, or
+    /// a witness of infeasibility excludes too little.
     NotVerified,
 }
 
@@ -72,11 +77,14 @@ pub struct BlockReport {
     pub size: usize,
     /// Smallest eigenvalue of F(x), recomputed from the expression and not from the solver's variables.
     pub smallest_eigenvalue: f64,
+    /// A proved lower bound on the smallest eigenvalue of F(x), all rounding accounted for, by a verified Cholesky
+    /// factorisation of F(x) as the expression states it; −∞ where there is no proof.
+    pub verified_lower_bound: f64,
     /// The margin imposed: F(x) ⪰ margin·I.
     pub margin: f64,
 }
 
-/// Residuals of the answer, relative to the data.
+/// Residuals of the answer, relative to the data; `primal` and `dual` of the problem as it was solved, balanced or not.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Residuals {
     /// By how much the blocks differ from the solver's positive definite slack:
@@ -87,6 +95,15 @@ pub struct Residuals {
     /// max(|p − d|, Σ|cᵢ − A(Z)ᵢ||xᵢ|) / (1 + |p| + |d|) for the objective p and the dual objective d: the second term is what the dual
     /// residual may take from the bound d.
     pub gap: f64,
+}
+
+/// What balancing did to the problem before it was solved; it is undone in the answer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Balancing {
+    /// Smallest and largest absolute coefficient of the problem as stated.
+    pub before: (f64, f64),
+    /// The same of the problem that was solved.
+    pub after: (f64, f64),
 }
 
 /// One interior-point iteration, as it began.
@@ -121,6 +138,8 @@ pub struct Answer {
     pub gap: f64,
     /// Every inequality, in the order stated.
     pub blocks: Vec<BlockReport>,
+    /// Coefficient ranges before and after balancing.
+    pub balancing: Balancing,
     /// Residuals of the answer.
     pub residuals: Residuals,
     /// The course of the iteration.

@@ -9,6 +9,11 @@ pub(crate) struct Program {
     /// c.
     pub objective: Vec<f64>,
     pub blocks: Vec<Block>,
+    /// Units of the unknowns: the blocks hold the coefficients of xᵢ = sᵢ x̃ᵢ, the objective those of x̃ᵢ.
+    pub scale: Vec<f64>,
+    /// The objective is this multiple of the one that was stated.
+    pub omega: f64,
+    pub balanced: bool,
 }
 
 /// One block F_b.
@@ -139,22 +144,51 @@ impl Block {
         }
     }
 
-    /// The largest absolute value that each entry has in C and all F_i (estimated for factored blocks), symmetric,
-    /// in the block's storage.
-    pub fn magnitudes(&self) -> Vec<f64> {
-        let mut out: Vec<f64> = self.constant().iter().map(|c| c.abs()).collect();
+    /// Visits every coefficient as (row, column, unknown or `None` for C, value), row ≥ column; of factored blocks the products that
+    /// make up the coefficients.
+    pub fn entries(&self, visit: &mut dyn FnMut(usize, usize, Option<usize>, f64)) {
         match self {
             Self::Dense(block) => {
-                block.factored.magnitudes(&mut out);
-                block.sparse.magnitudes(&mut out);
+                let n = block.size;
+                for j in 0..n {
+                    (j..n).for_each(|i| visit(i, j, None, block.constant[i + j * n]));
+                }
+                block.factored.entries(visit);
+                block.sparse.entries(visit);
             }
             Self::Diagonal(block) => {
-                for (out, row) in out.iter_mut().zip(&block.rows) {
-                    *out = row.iter().fold(*out, |m, (_, value)| m.max(value.abs()));
+                for (i, (constant, row)) in block.constant.iter().zip(&block.rows).enumerate() {
+                    visit(i, i, None, *constant);
+                    row.iter().for_each(|&(unknown, value)| visit(i, i, Some(unknown), value));
                 }
             }
         }
-        out
+    }
+
+    /// F ← F − margin·I.
+    pub fn subtract(&mut self, margin: f64) {
+        match self {
+            Self::Dense(block) => (0..block.size).for_each(|i| block.constant[i + i * block.size] -= margin),
+            Self::Diagonal(block) => block.constant.iter_mut().for_each(|c| *c -= margin),
+        }
+    }
+
+    /// F ← D F D for a diagonal D.
+    pub fn scale(&mut self, d: &[f64]) {
+        match self {
+            Self::Dense(block) => {
+                let n = block.size;
+                block.constant.iter_mut().enumerate().for_each(|(at, c)| *c *= d[at % n] * d[at / n]);
+                block.factored.scale(d);
+                block.sparse.scale(d);
+            }
+            Self::Diagonal(block) => {
+                for ((constant, row), d) in block.constant.iter_mut().zip(&mut block.rows).zip(d) {
+                    *constant *= d * d;
+                    row.iter_mut().for_each(|(_, value)| *value *= d * d);
+                }
+            }
+        }
     }
 
     /// M ← M + tr(F_i P F_j Z), lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.

@@ -180,6 +180,24 @@ impl Factored {
         }
     }
 
+    /// Visits the products u_i v_j that make up the coefficients as (row, column, unknown, value), row ≥ column.
+    pub fn entries(&self, visit: &mut dyn FnMut(usize, usize, Option<usize>, f64)) {
+        for group in &self.groups {
+            for (at, &position) in group.positions.iter().enumerate() {
+                for &(i, u) in self.w.column(group.u + at / group.cols) {
+                    for &(j, v) in self.w.column(group.v + at % group.cols) {
+                        visit(i.max(j), i.min(j), Some(position), u * v);
+                    }
+                }
+            }
+        }
+    }
+
+    /// F ← D F D for a diagonal D.
+    pub fn scale(&mut self, d: &[f64]) {
+        self.w.entries.iter_mut().for_each(|(i, value)| *value *= d[*i]);
+    }
+
     /// out_i ← max(out_i, estimate of ‖D F_i D‖_F) for a diagonal D.
     pub fn norms(&self, d: &[f64], out: &mut [f64]) {
         let length = |j: usize| self.w.column(j).iter().map(|&(i, v)| (v * d[i]).powi(2)).sum::<f64>().sqrt();
@@ -190,28 +208,6 @@ impl Factored {
                     let norm = 2.0_f64.sqrt() * lengths[group.u + r] * lengths[group.v + s];
                     let out = &mut out[group.positions[r * group.cols + s]];
                     *out = out.max(norm);
-                }
-            }
-        }
-    }
-
-    /// out_jk ← max(out_jk, estimate of |F_i,jk|) over all i.
-    pub fn magnitudes(&self, out: &mut [f64]) {
-        let n = self.n;
-        for group in &self.groups {
-            let largest = |columns: std::ops::Range<usize>| {
-                let mut out = vec![0.0_f64; n];
-                for &(i, value) in columns.flat_map(|j| self.w.column(j)) {
-                    out[i] = out[i].max(value.abs());
-                }
-                out
-            };
-            let u = largest(group.u..group.u + group.rows);
-            let v = largest(group.v..group.v + group.cols);
-            for i in 0..n {
-                for j in 0..n {
-                    let value = (u[i] * v[j]).max(u[j] * v[i]);
-                    out[i + j * n] = out[i + j * n].max(value);
                 }
             }
         }

@@ -16,10 +16,12 @@ use crate::{Options, start};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+/// A point whose relative gap is still larger than this is well inside.
+const BACK_OFF: f64 = 1e-6;
 /// Largest relative gap of a point that is called solved.
 const SOLVED_GAP: f64 = 1e-7;
-/// A multiplier is a witness of infeasibility when its residual is this small against the dual objective.
-const CERTIFICATE: f64 = 1e-8;
+/// A multiplier is a witness of infeasibility when its residual is this small against the dual objective: rounding level.
+const CERTIFICATE: f64 = 1e-14;
 
 /// From here on it is tried to complete a multiplier to an exact witness.
 const NEAR_CERTIFICATE: f64 = 1e-3;
@@ -56,12 +58,22 @@ pub(crate) struct Solution {
     pub ending: Ending,
     pub residuals: Residuals,
     pub dual_objective: f64,
+    /// A strictly feasible x not far from the optimum, to back off to.
+    pub interior: Option<Vec<f64>>,
+    /// Sensible units of the unknowns.
+    pub units: Vec<f64>,
     pub log: Vec<IterationLog>,
 }
 
 /// Everything the iteration works on.
 struct Iteration<'a> {
     operators: &'a [Block],
+    /// The operators' unknowns are sᵢ times those of the iteration.
+    scale: &'a [f64],
+    /// What counts as 1 in the objective.
+    unit: f64,
+    /// Unknowns as the operators take them.
+    unscaled: Vec<f64>,
     objective: &'a [f64],
     options: &'a Options,
     blocks: Vec<BlockState>,
@@ -109,11 +121,11 @@ impl Status {
 /// one, a second one without objective decides between infeasible and unbounded.
 pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
     let started = Instant::now();
-    let solution = iterate(&program.blocks, &program.objective, options, started);
+    let solution = iterate(program, &program.objective, options, started);
     let unseen = solution.residuals.primal > options.feasibility_tolerance;
     if matches!(solution.ending, Ending::DualInfeasible(_)) && unseen {
         let zero = vec![0.0; program.objective.len()];
-        let feasibility = iterate(&program.blocks, &zero, options, started);
+        let feasibility = iterate(program, &zero, options, started);
         match feasibility.ending {
             Ending::PrimalInfeasible => return feasibility,
             Ending::Converged => {
@@ -125,12 +137,13 @@ pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
     solution
 }
 
-fn iterate(blocks: &[Block], objective: &[f64], options: &Options, started: Instant) -> Solution {
-    let mut it = Iteration::new(blocks, objective, options);
+fn iterate(program: &Program, objective: &[f64], options: &Options, started: Instant) -> Solution {
+    let mut it = Iteration::new(program, objective, options);
     let mut log: Vec<IterationLog> = Vec::new();
     let mut best: Option<(f64, Status, Point)> = None;
     let mut since_progress = 0;
     let mut best_witness = f64::INFINITY;
+    let mut interior = None;
     let ending = loop {
         it.update_residuals();
         let status = it.status();
@@ -150,6 +163,9 @@ fn iterate(blocks: &[Block], objective: &[f64], options: &Options, started: Inst
             dual_step: 0.0,
         });
         let Residuals { primal, dual, gap } = status.residuals;
+        if it.feasible && gap > BACK_OFF {
+            interior = Some(it.x.clone());
+        }
         let tolerance = options.feasibility_tolerance;
         if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance {
             break Ending::Converged;
@@ -191,18 +207,23 @@ fn iterate(blocks: &[Block], objective: &[f64], options: &Options, started: Inst
         other => other,
     };
     let (_, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));
-    Solution { point, ending, residuals: status.residuals, dual_objective: status.dual_objective, log }
+    let units = program.scale.clone();
+    Solution { point, ending, residuals: status.residuals, dual_objective: status.dual_objective, interior, units, log }
 }
 
 impl<'a> Iteration<'a> {
-    fn new(operators: &'a [Block], objective: &'a [f64], options: &'a Options) -> Self {
+    fn new(program: &'a Program, objective: &'a [f64], options: &'a Options) -> Self {
         let unknowns = objective.len();
-        let starts = start::start(operators, objective);
+        let operators = &program.blocks[..];
+        let starts = start::start(program, objective);
         let blocks: Vec<BlockState> =
             operators.iter().zip(starts).map(|(block, (s, z))| BlockState::new(block, unknowns, &s, &z)).collect();
         let largest = operators.iter().filter(|b| !b.is_diagonal()).map(|b| b.size()).max().unwrap_or(1);
         Self {
             operators,
+            scale: &program.scale,
+            unit: program.omega.min(1.0),
+            unscaled: vec![0.0; unknowns],
             objective,
             options,
             x: vec![0.0; unknowns],
@@ -229,8 +250,9 @@ impl<'a> Iteration<'a> {
     /// R = F(x) − S, closed exactly as soon as F(x) itself is positive definite; A(Z).
     fn update_residuals(&mut self) {
         let mut closed = true;
+        product(self.scale, &self.x, &mut self.unscaled);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-            state.update_residual(block, &self.x);
+            state.update_residual(block, &self.unscaled);
         }
         let worst = self.primal_residual();
         if self.feasible || worst <= 1e-7 {
@@ -243,6 +265,7 @@ impl<'a> Iteration<'a> {
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             block.adjoint(1.0, &state.z, &mut self.az, &mut state.operator);
         }
+        scale_by(self.scale, &mut self.az);
     }
 
     fn primal_residual(&self) -> f64 {
@@ -263,7 +286,7 @@ impl<'a> Iteration<'a> {
         // d ≤ p* + Σ|cᵢ − A(Z)ᵢ||xᵢ*|: with large x, small residuals spoil the bound.
         let differences = self.objective.iter().zip(&self.az).map(|(c, a)| c - a);
         let uncertainty: f64 = differences.zip(&self.x).map(|(difference, x)| (difference * x).abs()).sum();
-        let scale = 1.0 + objective.abs() + dual_objective.abs();
+        let scale = self.unit + objective.abs() + dual_objective.abs();
         let residuals = Residuals {
             primal: self.primal_residual(),
             dual: self.dual_residual(),
@@ -292,6 +315,7 @@ impl<'a> Iteration<'a> {
             let BlockState { s_inverse, z, operator, .. } = state;
             block.schur(s_inverse, z, &mut self.schur.matrix, unknowns, operator);
         }
+        self.schur.scale_by(self.scale);
         let (mut sigma, mut primal, mut dual);
         let mut regularization = 0.0;
         loop {
@@ -336,13 +360,16 @@ impl<'a> Iteration<'a> {
 
     /// dx, dS and dZ for the right side that the blocks hold.
     fn direction(&mut self) {
-        self.right_side.iter_mut().zip(self.objective).for_each(|(r, c)| *r = -c);
+        self.right_side.fill(0.0);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.add_right_side(block, &mut self.right_side);
         }
+        scale_by(self.scale, &mut self.right_side);
+        crate::dense::axpy(-1.0, self.objective, &mut self.right_side);
         self.schur.solve(&self.right_side, &mut self.dx);
+        product(self.scale, &self.dx, &mut self.unscaled);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-            state.complete(block, &self.dx, self.feasible);
+            state.complete(block, &self.unscaled, self.feasible);
         }
     }
 
@@ -352,10 +379,12 @@ impl<'a> Iteration<'a> {
     fn refine(&mut self) -> f64 {
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
-            self.right_side.copy_from_slice(self.objective);
+            self.right_side.fill(0.0);
             for (state, block) in self.blocks.iter_mut().zip(self.operators) {
                 state.subtract_dual(block, &mut self.right_side);
             }
+            scale_by(self.scale, &mut self.right_side);
+            crate::dense::axpy(1.0, self.objective, &mut self.right_side);
             let size = self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs())) / (1.0 + self.objective_norm);
             if size.is_nan() || size <= 1e-3 * self.options.feasibility_tolerance || size > 0.9 * last {
                 return size;
@@ -368,8 +397,9 @@ impl<'a> Iteration<'a> {
                 return size;
             }
             crate::dense::axpy(1.0, &self.change, &mut self.dx);
+            product(self.scale, &self.change, &mut self.unscaled);
             for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-                state.refine(block, &self.change);
+                state.refine(block, &self.unscaled);
             }
         }
         last
@@ -397,6 +427,16 @@ impl<'a> Iteration<'a> {
         }
         None
     }
+}
+
+/// v ← s∘v.
+fn scale_by(s: &[f64], v: &mut [f64]) {
+    v.iter_mut().zip(s).for_each(|(v, s)| *v *= s);
+}
+
+/// out ← s∘v.
+fn product(s: &[f64], v: &[f64], out: &mut [f64]) {
+    out.iter_mut().zip(v).zip(s).for_each(|((out, v), s)| *out = v * s);
 }
 
 /// The larger one, or NaN when either is.

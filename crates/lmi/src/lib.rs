@@ -42,21 +42,25 @@
 //!
 //! `F(x) ≻ 0` has no meaning for an optimum, which lies on the boundary. Every strict inequality is posed as
 //! `F(x) ⪰ margin·I`, with a small default margin relative to the block's scale ([`Options::margin`]) or one of
-//! your choice ([`Problem::positive_definite_by`]). After solving, the smallest eigenvalue of every block is
-//! computed anew from the expressions; [`Outcome::Solved`] is given only when all of them are positive.
+//! your choice ([`Problem::positive_definite_by`]). After solving, a lower bound on the smallest eigenvalue of every block is
+//! proved, from the expressions, all rounding accounted for; [`Outcome::Solved`] is given only when all of them are positive.
 //!
 //! # Outcomes
 //!
 //! Infeasible, unbounded and inaccurate are outcomes ([`Outcome`]), not errors: they carry a witness, a ray or the
-//! best point with its residuals. [`Error`] is for problems that have no meaning.
+//! best point with its residuals. [`Error`] is for problems that have no meaning. The [`guide`] has a page on each.
 
 mod answer;
+mod balancing;
 mod block;
 mod dense;
 mod direction;
+mod double_double;
 mod error;
+mod explanation;
 mod expression;
 mod factored;
+pub mod guide;
 mod interior_point;
 mod lanczos;
 mod lowering;
@@ -64,6 +68,7 @@ mod operators;
 mod options;
 mod problem;
 mod report;
+mod rigorous;
 mod schur;
 pub mod sdpa;
 mod sparse;
@@ -71,8 +76,9 @@ mod start;
 mod vectorized;
 mod verification;
 
-pub use answer::{Answer, BlockReport, InaccurateReason, IterationLog, Outcome, Ray, Residuals, Witness};
+pub use answer::{Answer, Balancing, BlockReport, InaccurateReason, IterationLog, Outcome, Ray, Residuals, Witness};
 pub use error::Error;
+pub use explanation::{Carrier, Explanation};
 pub use expression::Expr;
 pub use options::Options;
 pub use problem::Problem;

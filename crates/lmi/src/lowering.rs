@@ -68,7 +68,7 @@ impl Layout {
     }
 }
 
-/// A problem in the solver's form, with what is needed to read its answer.
+/// A problem in the solver's form, margins not yet subtracted, with what is needed to read its answer.
 #[derive(Debug)]
 pub(crate) struct Lowered {
     pub program: Program,
@@ -99,12 +99,11 @@ pub(crate) fn lower(
         let place = format!("inequality \"{}\"", inequality.name);
         check_expression(problem, &place, &inequality.expression)?;
         check_symmetric(inequality, &layout)?;
-        let scale = verification::largest_entry(&inequality.expression.constant);
-        let margin = inequality.margin.unwrap_or(options.margin * if scale > 0.0 { scale } else { 1.0 });
+        let margin = inequality.margin.unwrap_or(options.default_margin(&inequality.expression.constant));
         if !margin.is_finite() {
             return Err(Error::NotFinite { place: format!("the margin of {place}"), row: 0, column: 0, value: margin });
         }
-        blocks.push(lower_block(&inequality.expression, margin, &layout));
+        blocks.push(lower_block(&inequality.expression, &layout));
         margins.push(margin);
     }
     let (mut c, mut objective_constant, mut sign) = (vec![0.0; layout.len()], 0.0, 1.0);
@@ -122,7 +121,7 @@ pub(crate) fn lower(
         }
         c = layout.scalars(&gradients);
     }
-    let program = Program { objective: c, blocks };
+    let program = Program { omega: 1.0, balanced: false, scale: vec![1.0; c.len()], objective: c, blocks };
     Ok(Lowered { program, layout, margins, objective_constant, sign })
 }
 
@@ -204,14 +203,13 @@ fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error
     Ok(())
 }
 
-fn lower_block(expression: &Expr, margin: f64, layout: &Layout) -> Block {
+fn lower_block(expression: &Expr, layout: &Layout) -> Block {
     let n = expression.nrows();
     let mut constant = vec![0.0; n * n];
     for j in 0..n {
         for i in 0..n {
             constant[i + j * n] = 0.5 * (expression.constant[(i, j)] + expression.constant[(j, i)]);
         }
-        constant[j + j * n] -= margin;
     }
     let mut entries = Vec::new();
     let mut products = Vec::new();
@@ -452,7 +450,7 @@ mod tests {
         let f = riccati(&y, &l)
             + t.times(&Mat::identity(8, 8))
             + (y.trace() + 2.0 * &t).times(&Mat::from_fn(8, 8, |i, j| (i * j) as f64));
-        let block = lower_block(&f, 0.0, &layout);
+        let block = lower_block(&f, &layout);
         let mut scratch = block.scratch(n);
         let columns = |m: &Mat<f64>| -> Vec<f64> { (0..64).map(|at| m[(at % 8, at / 8)]).collect() };
         let value = |x: &[f64]| {

@@ -1,5 +1,6 @@
 //! What a solve may take and how far it has to get.
 
+use crate::{Mat, verification};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -19,8 +20,8 @@ pub struct Options {
     pub feasibility_tolerance: f64,
     /// Default margin of strict inequalities, relative to the block's scale (default 1e-12).
     ///
-    /// `F(x) ≻ 0` is posed as `F(x) ⪰ margin · s · I`, where s is the largest absolute entry of the block's
-    /// known part (1 when the known part is zero).
+    /// `F(x) ≻ 0` is posed as `F(x) ⪰ margin · s · I`, where s is the smallest absolute diagonal entry of the block's
+    /// known part that is not zero (its largest entry when the diagonal is zero, 1 when the known part is).
     pub margin: f64,
     /// Stops the solve soon after it becomes true, with [`Outcome::Inaccurate`](crate::Outcome::Inaccurate).
     pub cancel: Option<Arc<AtomicBool>>,
@@ -42,6 +43,21 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The margin of a strict inequality with this known part, relative to its smallest diagonal entry that is not zero.
+    ///
+    /// The largest entry would not do: in `diag(Q⁻¹, R⁻¹)` with Q⁻¹ = 1 and R⁻¹ = 10¹² a margin of 10⁻¹² · 10¹² leaves no solution.
+    pub(crate) fn default_margin(&self, constant: &Mat<f64>) -> f64 {
+        let diagonal = (0..constant.nrows()).map(|i| constant[(i, i)].abs()).filter(|c| *c > 0.0);
+        let smallest = diagonal.fold(f64::INFINITY, f64::min);
+        let largest = verification::largest_entry(constant);
+        let scale = match (smallest.is_finite(), largest > 0.0) {
+            (true, _) => smallest,
+            (false, true) => largest,
+            (false, false) => 1.0,
+        };
+        self.margin * scale
+    }
+
     pub(crate) fn check(&self) -> Result<(), crate::Error> {
         let tolerance = |option, value: f64| {
             if value > 0.0 && value < 1.0 {

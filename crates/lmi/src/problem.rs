@@ -1,11 +1,12 @@
 //! Problems: unknowns, inequalities and an objective.
 
-use crate::answer::{Answer, BlockReport};
+use crate::answer::{Answer, BlockReport, InaccurateReason, Outcome};
 use crate::expression::{Expr, Unknown};
-use crate::lowering::{Layout, Lowered, lower};
+use crate::lowering::{Layout, lower};
 use crate::report::{Original, Translation, report};
-use crate::verification::{self, Spectrum};
-use crate::{Error, Mat, Options, interior_point};
+use crate::rigorous::{Enclosure, Gradient};
+use crate::verification::Spectrum;
+use crate::{Error, Mat, Options, balancing};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// An inequality `F(x) ⪰ margin·I`.
@@ -32,7 +33,7 @@ pub struct Problem {
     id: u64,
     names: Vec<String>,
     unknowns: Vec<Unknown>,
-    inequalities: Vec<Inequality>,
+    pub(crate) inequalities: Vec<Inequality>,
     objective: Option<(Sense, Expr)>,
 }
 
@@ -109,15 +110,40 @@ impl Problem {
     /// Infeasible, unbounded and inaccurate are outcomes.
     pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
         options.check()?;
+        let answer = self.solve_once(options)?;
+        let unproved = matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::NotVerified));
+        if unproved && options.margin > 0.0 {
+            // The default margin may have been too much for a set that is thin: F(x) ≻ 0 is proved or not, whatever was imposed.
+            let again = self.solve_once(&Options { margin: 0.0, ..options.clone() })?;
+            if matches!(again.outcome, Outcome::Solved) {
+                return Ok(again);
+            }
+        }
+        Ok(answer)
+    }
+
+    fn solve_once(&self, options: &Options) -> Result<Answer, Error> {
         let lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
-        let result = interior_point::solve(&lowered.program, options);
+        let (result, balancing) = balancing::solve(lowered.program, &lowered.margins, options);
         let translation = Translation {
             layout: &lowered.layout,
             unknowns: &self.unknowns,
             objective_constant: lowered.objective_constant,
             sign: lowered.sign,
         };
-        Ok(report(&Stated { problem: self, lowered: &lowered }, &translation, result, options))
+        Ok(report(
+            &Stated { problem: self, layout: &lowered.layout, margins: &lowered.margins },
+            &translation,
+            result,
+            balancing,
+            options,
+        ))
+    }
+
+    /// The same unknowns and nothing else.
+    pub(crate) fn without_inequalities(&self) -> Self {
+        let Self { id, names, unknowns, .. } = self;
+        Self { id: *id, names: names.clone(), unknowns: unknowns.clone(), inequalities: Vec::new(), objective: None }
     }
 
     fn unknown(&mut self, name: String, rows: usize, cols: usize, symmetric: bool) -> Expr {
@@ -131,18 +157,19 @@ impl Problem {
 /// A problem as its expressions state it.
 struct Stated<'a> {
     problem: &'a Problem,
-    lowered: &'a Lowered,
+    layout: &'a Layout,
+    margins: &'a [f64],
 }
 
 impl Original for Stated<'_> {
     fn blocks(&self) -> Vec<BlockReport> {
-        let reports =
-            self.problem.inequalities.iter().zip(&self.lowered.margins).map(|(inequality, &margin)| BlockReport {
-                name: inequality.name.clone(),
-                size: inequality.expression.nrows(),
-                smallest_eigenvalue: f64::NAN,
-                margin,
-            });
+        let reports = self.problem.inequalities.iter().zip(self.margins).map(|(inequality, &margin)| BlockReport {
+            name: inequality.name.clone(),
+            size: inequality.expression.nrows(),
+            smallest_eigenvalue: f64::NAN,
+            verified_lower_bound: f64::NEG_INFINITY,
+            margin,
+        });
         reports.collect()
     }
 
@@ -150,23 +177,28 @@ impl Original for Stated<'_> {
         self.problem.inequalities[block].expression.evaluate(&|unknown| &values[unknown.index])
     }
 
+    fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure {
+        Enclosure::of_expression(&self.problem.inequalities[block].expression, &|unknown| &values[unknown.index])
+    }
+
     fn objective(&self, values: &[Mat<f64>]) -> f64 {
         let objective = self.problem.objective.as_ref();
         objective.map_or(0.0, |(_, expression)| expression.evaluate(&|unknown| &values[unknown.index])[(0, 0)])
     }
 
-    fn gradient(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
-        let mut gradients: Vec<Mat<f64>> =
-            self.problem.unknowns.iter().map(|unknown| Mat::zeros(unknown.rows, unknown.cols)).collect();
-        for (inequality, z) in self.problem.inequalities.iter().zip(multipliers) {
-            for term in inequality.expression.terms.iter() {
-                gradients[term.unknown.index] += verification::gradient(term, z);
-            }
-        }
-        self.lowered.layout.scalars(&gradients)
+    fn gradient_bounds(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
+        let expressions = self.problem.inequalities.iter().map(|inequality| &inequality.expression);
+        let gradient = Gradient::new(&self.problem.unknowns, expressions.zip(multipliers));
+        let values = self.layout.scalars(&gradient.values);
+        let radii = self.layout.scalars(&gradient.radii);
+        values.iter().zip(radii).map(|(value, radius)| 1.001 * (value.abs() + radius)).collect()
+    }
+
+    fn strict(&self, block: usize) -> bool {
+        self.problem.inequalities[block].margin.is_none()
     }
 
     fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {
-        self.problem.inequalities[block].margin.map(|margin| margin - spectrum.rounding)
+        self.problem.inequalities[block].margin.map(|margin| margin - 4.0 * spectrum.rounding)
     }
 }

@@ -1,10 +1,11 @@
 //! From the solver's point to an answer: every claim is recomputed on the data as they were stated.
 
-use crate::answer::{Answer, BlockReport, InaccurateReason, Outcome, Ray, Witness};
-use crate::expression::{Unknown, inner_product};
+use crate::answer::{Answer, Balancing, BlockReport, InaccurateReason, Outcome, Ray, Witness};
+use crate::expression::Unknown;
 use crate::interior_point::{Ending, Solution};
 use crate::lowering::Layout;
-use crate::verification::{Spectrum, square};
+use crate::rigorous::Enclosure;
+use crate::verification::{Spectrum, largest_entry, square};
 use crate::{Mat, Options};
 
 /// A problem as it was stated: `F_b(x) = C_b + Σ xᵢ F_{b,i}`, objective `constant + sign · cᵀx`.
@@ -13,10 +14,14 @@ pub(crate) trait Original {
     fn blocks(&self) -> Vec<BlockReport>;
     /// F_b at the unknowns given, margins not subtracted. A diagonal block comes as a column.
     fn value(&self, block: usize, values: &[Mat<f64>]) -> Mat<f64>;
+    /// F_b at the unknowns given, with bounds on its entries.
+    fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure;
     /// The objective at the unknowns given, in the sense stated.
     fn objective(&self, values: &[Mat<f64>]) -> f64;
-    /// The gradient of `Σ_b⟨F_b, Z_b⟩` with respect to the scalar unknowns.
-    fn gradient(&self, multipliers: &[Mat<f64>]) -> Vec<f64>;
+    /// Proved upper bounds on the absolute values of the gradient of `Σ_b⟨F_b, Z_b⟩` with respect to the scalar unknowns.
+    fn gradient_bounds(&self, multipliers: &[Mat<f64>]) -> Vec<f64>;
+    /// Whether the margin of a block stands for a strict inequality.
+    fn strict(&self, block: usize) -> bool;
     /// By how much the smallest eigenvalue of a block of an answer must exceed zero: `None` for a strict inequality.
     fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64>;
 }
@@ -35,35 +40,44 @@ pub(crate) fn report(
     original: &dyn Original,
     translation: &Translation<'_>,
     result: Solution,
+    balancing: Balancing,
     options: &Options,
 ) -> Answer {
-    let values = translation.layout.matrices(&result.point.x);
-    let mut blocks = original.blocks();
-    let mut verified = true;
-    for (index, block) in blocks.iter_mut().enumerate() {
-        let spectrum = spectrum(&original.value(index, &values), block.size);
-        block.smallest_eigenvalue = spectrum.smallest;
-        verified &= match original.floor(index, &spectrum) {
-            None => spectrum.smallest > 0.0,
-            Some(floor) => spectrum.smallest >= floor,
-        };
+    let mut values = translation.layout.matrices(&result.point.x);
+    let (mut blocks, mut verified) = verify(original, &values);
+    if let (false, Ending::Converged, Some(interior)) = (verified, &result.ending, &result.interior) {
+        // Rounding put the optimum outside: back off as far as the gap allows.
+        let inside = translation.layout.matrices(interior);
+        let (here, there) = (original.objective(&values), original.objective(&inside));
+        let share = (BACK_OFF * (1.0 + 2.0 * here.abs()) / (there - here).abs()).min(1.0);
+        let between: Vec<Mat<f64>> = values.iter().zip(&inside).map(|(x, y)| x + share * (y - x)).collect();
+        let (backed_off, proved) = verify(original, &between);
+        if proved {
+            (values, blocks, verified) = (between, backed_off, true);
+        }
     }
     let multipliers: Vec<Mat<f64>> =
         result.point.z.iter().zip(&blocks).map(|(z, block)| square(z, block.size)).collect();
+    let stated = |objective: f64| translation.objective_constant + translation.sign * objective;
+    let objective = original.objective(&values);
+    let dual_objective = stated(result.dual_objective);
+    let mut residuals = result.residuals;
+    let gap = (objective - dual_objective).abs();
+    if let Ending::Converged = result.ending {
+        residuals.gap = residuals.gap.max(gap / (1.0 + objective.abs() + dual_objective.abs()));
+        verified &= gap.is_finite() && objective.is_finite() && residuals.gap <= 1e-7;
+    }
     let unverified = Outcome::Inaccurate(InaccurateReason::NotVerified);
     let outcome = match result.ending {
         Ending::Converged if verified => Outcome::Solved,
         Ending::Converged => unverified,
-        Ending::PrimalInfeasible => witness(original, translation.layout, &blocks, &multipliers, options)
+        Ending::PrimalInfeasible => witness(original, translation.layout, &blocks, &multipliers, &result.units)
             .map_or(unverified, Outcome::Infeasible),
         Ending::DualInfeasible(direction) => {
             ray(original, translation, &blocks, &direction, options).map_or(unverified, Outcome::Unbounded)
         }
         Ending::Stopped(reason) => Outcome::Inaccurate(reason),
     };
-    let stated = |objective: f64| translation.objective_constant + translation.sign * objective;
-    let objective = original.objective(&values);
-    let dual_objective = stated(result.dual_objective);
     let mut iterations = result.log;
     for entry in &mut iterations {
         entry.objective = stated(entry.objective);
@@ -73,9 +87,10 @@ pub(crate) fn report(
         outcome,
         objective,
         dual_objective,
-        gap: (objective - dual_objective).abs(),
+        gap,
         blocks,
-        residuals: result.residuals,
+        balancing,
+        residuals,
         iterations,
         multipliers,
         unknowns: translation.unknowns.to_vec(),
@@ -83,42 +98,123 @@ pub(crate) fn report(
     }
 }
 
+/// Relative change of the objective that backing off may cost.
+const BACK_OFF: f64 = 3e-8;
+
+/// The blocks at the unknowns given, and whether each is proved to be as positive definite as it has to be.
+fn verify(original: &dyn Original, values: &[Mat<f64>]) -> (Vec<BlockReport>, bool) {
+    let mut blocks = original.blocks();
+    let mut verified = true;
+    for (index, block) in blocks.iter_mut().enumerate() {
+        let spectrum = spectrum(&original.value(index, values), block.size);
+        block.smallest_eigenvalue = spectrum.smallest;
+        let bound = original.enclosure(index, values).smallest_eigenvalue_bound(&spectrum);
+        block.verified_lower_bound = bound;
+        verified &= match original.floor(index, &spectrum) {
+            None => bound > 0.0,
+            Some(floor) => bound >= floor,
+        };
+    }
+    (blocks, verified)
+}
+
 /// Of a square matrix, or of a diagonal one given as a column.
 fn spectrum(value: &Mat<f64>, size: usize) -> Spectrum {
     if value.ncols() == size { Spectrum::of(value) } else { Spectrum::of_diagonal(value) }
 }
 
-/// Checks that the multipliers exclude every point, and normalises them.
+/// Least radius of the excluded box, in the units of the balanced unknowns, that is called infeasible.
+const EXCLUDED: f64 = 1e10;
+
+/// Proves that the multipliers exclude every point within reach, and normalises them.
 fn witness(
     original: &dyn Original,
     layout: &Layout,
     blocks: &[BlockReport],
     z: &[Mat<f64>],
-    options: &Options,
+    units: &[f64],
 ) -> Option<Witness> {
-    let zero = layout.matrices(&vec![0.0; layout.len()]);
-    let mut at_zero = 0.0;
-    for (index, (block, z)) in blocks.iter().zip(z).enumerate() {
-        let c = original.value(index, &zero);
-        let diagonal = |i: usize| {
-            if c.ncols() == block.size { c[(i, i)] } else { c[(i, 0)] }
-        };
-        at_zero += match c.ncols() == block.size {
-            true => inner_product(&c, z),
-            false => (0..block.size).map(|i| diagonal(i) * z[(i, i)]).sum::<f64>(),
-        };
-        at_zero -= (0..block.size).map(|i| block.margin * z[(i, i)]).sum::<f64>();
-    }
-    if at_zero.is_nan() || at_zero >= 0.0 {
+    let definite: Vec<Mat<f64>> = z.iter().map(made_definite).collect::<Option<_>>()?;
+    let at_zero = at_zero(original, layout, blocks, &definite);
+    if at_zero.total.is_nan() || at_zero.total >= 0.0 {
         return None;
     }
-    let multipliers: Vec<Mat<f64>> = z.iter().map(|z| (-1.0 / at_zero) * z).collect();
-    let residual =
-        original.gradient(&multipliers).iter().fold(0.0, |m: f64, g| if g.is_nan() { *g } else { m.max(g.abs()) });
-    let smallest_eigenvalue = multipliers.iter().map(|z| Spectrum::of(z).smallest).fold(f64::INFINITY, f64::min);
-    let scale = multipliers.iter().map(Mat::norm_l2).fold(1.0, f64::max);
-    let holds = residual <= 2.0 * options.feasibility_tolerance && smallest_eigenvalue >= -1e-12 * scale;
-    holds.then_some(Witness { multipliers, residual, smallest_eigenvalue })
+    let multipliers: Vec<Mat<f64>> = definite.iter().map(|z| symmetric(&((-1.0 / at_zero.total) * z))).collect();
+    let at_zero = self::at_zero(original, layout, blocks, &multipliers);
+    // Where a default margin decides, F(x) ≻ 0 is excluded only if the known part itself has no share in the matter.
+    let needs_margin = at_zero.known > -0.5 * at_zero.total.abs();
+    if needs_margin && at_zero.known.abs() > 1e-14 * at_zero.magnitude {
+        return None;
+    }
+    let bounds = original.gradient_bounds(&multipliers);
+    let residual = bounds.iter().fold(0.0, |m: f64, g| if g.is_nan() { *g } else { m.max(*g) });
+    let reach: f64 = bounds.iter().zip(units).map(|(bound, unit)| bound * unit).sum();
+    let excluded_radius = 0.999 * -(at_zero.total + at_zero.error) / reach;
+    let mut smallest_eigenvalue = f64::INFINITY;
+    for z in &multipliers {
+        smallest_eigenvalue = smallest_eigenvalue.min(Spectrum::of(z).smallest);
+        if largest_entry(z) > 0.0 && !Enclosure::of_matrix(z).exceeds(0.0) {
+            return None;
+        }
+    }
+    let holds = excluded_radius >= EXCLUDED;
+    holds.then_some(Witness { multipliers, residual, excluded_radius, smallest_eigenvalue })
+}
+
+/// `Σ_b⟨C_b − margin·I, Z_b⟩`.
+struct AtZero {
+    total: f64,
+    /// The part that does not come from default margins.
+    known: f64,
+    /// Σ|terms| of that part.
+    magnitude: f64,
+    /// Bound on the rounding error of the total.
+    error: f64,
+}
+
+fn at_zero(original: &dyn Original, layout: &Layout, blocks: &[BlockReport], z: &[Mat<f64>]) -> AtZero {
+    let zero = layout.matrices(&vec![0.0; layout.len()]);
+    let mut sum = AtZero { total: 0.0, known: 0.0, magnitude: 0.0, error: 0.0 };
+    let (mut terms, mut magnitude) = (0_usize, 0.0);
+    for (index, (block, z)) in blocks.iter().zip(z).enumerate() {
+        let c = original.value(index, &zero);
+        let mut known = 0.0;
+        let mut add = |value: f64| {
+            known += value;
+            sum.magnitude += value.abs();
+            terms += 1;
+        };
+        if c.ncols() == block.size {
+            (0..block.size).for_each(|j| (0..block.size).for_each(|i| add(c[(i, j)] * z[(i, j)])));
+        } else {
+            (0..block.size).for_each(|i| add(c[(i, 0)] * z[(i, i)]));
+        }
+        let margin = (0..block.size).map(|i| block.margin * z[(i, i)]).sum::<f64>();
+        magnitude += margin.abs();
+        terms += block.size;
+        sum.total += known - margin;
+        sum.known += if original.strict(index) { known } else { known - margin };
+    }
+    sum.error = (terms + 4) as f64 * f64::EPSILON * (sum.magnitude + magnitude);
+    sum
+}
+
+fn symmetric(m: &Mat<f64>) -> Mat<f64> {
+    Mat::from_fn(m.nrows(), m.ncols(), |i, j| 0.5 * (m[(i, j)] + m[(j, i)]))
+}
+
+/// A symmetric matrix that is proved to be positive definite (or zero), moved up by a few rounding errors if need be.
+fn made_definite(z: &Mat<f64>) -> Option<Mat<f64>> {
+    let mut z = symmetric(z);
+    let spectrum = Spectrum::of(&z);
+    let rounding = spectrum.rounding.max(f64::EPSILON * spectrum.largest);
+    for _ in 0..4 {
+        if largest_entry(&z) == 0.0 || Enclosure::of_matrix(&z).exceeds(0.0) {
+            return Some(z);
+        }
+        (0..z.nrows()).for_each(|i| z[(i, i)] += rounding);
+    }
+    None
 }
 
 /// Checks that the direction keeps every block positive semidefinite while the objective improves.

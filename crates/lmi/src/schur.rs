@@ -40,6 +40,14 @@ impl Schur {
         }
     }
 
+    /// M ← diag(s) M diag(s).
+    pub fn scale_by(&mut self, s: &[f64]) {
+        let n = self.n;
+        for j in 0..n {
+            self.matrix[j * n + j..(j + 1) * n].iter_mut().zip(&s[j..]).for_each(|(m, i)| *m *= i * s[j]);
+        }
+    }
+
     /// Factorises M. Unknowns that appear nowhere stay where they are; linearly dependent coefficient matrices
     /// are met by adding to the (unit) diagonal, from `regularization` or rounding level upwards. False when M is not finite.
     pub fn factorize(&mut self, regularization: f64) -> bool {

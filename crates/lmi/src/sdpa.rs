@@ -30,9 +30,10 @@ use crate::expression::Unknown;
 use crate::factored::Factored;
 use crate::lowering::{Layout, check_size};
 use crate::report::{Original, Translation, report};
+use crate::rigorous::Enclosure;
 use crate::sparse::{Entry, Sparse};
 use crate::verification::Spectrum;
-use crate::{Error, Mat, Options, interior_point};
+use crate::{Error, Mat, Options, balancing};
 
 /// The shape of one block of F(x).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,9 +92,9 @@ impl Sdp {
         let m = self.objective.len();
         let unknowns = [Unknown { problem: u64::MAX, index: 0, rows: m, cols: 1, symmetric: false }];
         let layout = Layout::new(&unknowns);
-        let result = interior_point::solve(&self.program(), options);
+        let (result, balancing) = balancing::solve(self.program(), &vec![0.0; self.blocks.len()], options);
         let translation = Translation { layout: &layout, unknowns: &unknowns, objective_constant: 0.0, sign: 1.0 };
-        Ok(report(&Stated { sdp: self, options }, &translation, result, options))
+        Ok(report(&Stated { sdp: self, options }, &translation, result, balancing, options))
     }
 
     fn check(&self) -> Result<(), Error> {
@@ -167,7 +168,8 @@ impl Sdp {
                 sparse: Sparse::new(size, entries),
             })
         });
-        Program { objective: self.objective.clone(), blocks: blocks.collect() }
+        let scale = vec![1.0; self.objective.len()];
+        Program { objective: self.objective.clone(), blocks: blocks.collect(), scale, omega: 1.0, balanced: false }
     }
 }
 
@@ -183,6 +185,7 @@ impl Original for Stated<'_> {
             name: format!("block {}", index + 1),
             size: shape.size(),
             smallest_eigenvalue: f64::NAN,
+            verified_lower_bound: f64::NEG_INFINITY,
             margin: 0.0,
         };
         self.sdp.blocks.iter().enumerate().map(report).collect()
@@ -206,19 +209,41 @@ impl Original for Stated<'_> {
         value
     }
 
+    fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure {
+        let shape = self.sdp.blocks[block];
+        let mut sum = Enclosure::zeros(shape.size(), matches!(shape, BlockShape::Diagonal(_)));
+        let mut terms = 0;
+        for c in self.sdp.coefficients.iter().filter(|c| c.block == block) {
+            let x = c.unknown.map_or(-1.0, |unknown| values[0][(unknown, 0)]);
+            sum.add_product(c.row, c.column, c.value, x);
+            if c.row != c.column {
+                sum.add_product(c.column, c.row, c.value, x);
+            }
+            terms += 1;
+        }
+        // Every entry has at most one term of each matrix unless entries are repeated.
+        sum.count(terms);
+        sum
+    }
+
     fn objective(&self, values: &[Mat<f64>]) -> f64 {
         self.sdp.objective.iter().enumerate().map(|(i, c)| c * values[0][(i, 0)]).sum()
     }
 
-    fn gradient(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
-        let mut gradient = vec![0.0; self.sdp.objective.len()];
+    fn gradient_bounds(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
+        let mut gradient = Enclosure::zeros(self.sdp.objective.len(), true);
         for c in &self.sdp.coefficients {
             if let Some(unknown) = c.unknown {
                 let count = if c.row == c.column { 1.0 } else { 2.0 };
-                gradient[unknown] += count * c.value * multipliers[c.block][(c.row, c.column)];
+                gradient.add_product(unknown, unknown, count * c.value, multipliers[c.block][(c.row, c.column)]);
             }
         }
-        gradient
+        gradient.count(self.sdp.coefficients.len());
+        gradient.absolute_bounds()
+    }
+
+    fn strict(&self, _: usize) -> bool {
+        false
     }
 
     fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {

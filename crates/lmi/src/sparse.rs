@@ -138,21 +138,31 @@ impl Sparse {
         }
     }
 
+    /// Visits every entry as (row, column, unknown, value), row ≥ column.
+    pub fn entries(&self, visit: &mut dyn FnMut(usize, usize, Option<usize>, f64)) {
+        for c in &self.coefficients {
+            c.entries.iter().for_each(|&(i, j, value)| visit(i, j, Some(c.unknown), value));
+        }
+    }
+
+    /// F ← D F D for a diagonal D.
+    pub fn scale(&mut self, d: &[f64]) {
+        for c in &mut self.coefficients {
+            c.entries.iter_mut().for_each(|(i, j, value)| *value *= d[*i] * d[*j]);
+            c.full.iter_mut().for_each(|(place, j, value)| *value *= d[c.support[*place]] * d[*j]);
+            let weights = &mut self.weights[c.start..c.start + c.entries.len()];
+            for (&(i, j, value), weight) in c.entries.iter().zip(weights) {
+                weight.1 = if i == j { value } else { 2.0 * value };
+            }
+        }
+    }
+
     /// out_i ← max(out_i, ‖D F_i D‖_F) for a diagonal D.
     pub fn norms(&self, d: &[f64], out: &mut [f64]) {
         for c in &self.coefficients {
             let square = |&(i, j, v): &(usize, usize, f64)| (v * d[i] * d[j]).powi(2) * if i == j { 1.0 } else { 2.0 };
             let sum: f64 = c.entries.iter().map(square).sum();
             out[c.unknown] = out[c.unknown].max(sum.sqrt());
-        }
-    }
-
-    /// out_jk ← max(out_jk, |F_i,jk|) over all i.
-    pub fn magnitudes(&self, out: &mut [f64]) {
-        for &(i, j, value) in self.coefficients.iter().flat_map(|c| &c.entries) {
-            for at in [i + j * self.n, j + i * self.n] {
-                out[at] = out[at].max(value.abs());
-            }
         }
     }
 

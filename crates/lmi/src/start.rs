@@ -1,24 +1,25 @@
 //! The infeasible starting point x = 0, S = η D⁻², Z = ξ D², with D diagonal for each block.
 //!
 //! D balances the block: the largest absolute entries of D C D and all D Fᵢ D are about 1 in every row (Ruiz's iteration). For the balanced
-//! block S and Z are multiples of the identity, after Tütüncü, Toh and Todd (Math. Program. 95, 2003). Since the
+//! block S and Z are multiples of the identity (D = I where the problem was balanced before), after Tütüncü, Toh and Todd (Math. Program. 95, 2003). Since the
 //! search direction does not depend on D, this is all the balancing that the iteration needs.
 
-use crate::block::Block;
+use crate::block::{Block, Program};
 
 /// Rounds of balancing.
 const ROUNDS: usize = 8;
 
 /// The diagonals of S and Z for every block.
-pub(crate) fn start(blocks: &[Block], objective: &[f64]) -> Vec<(Vec<f64>, Vec<f64>)> {
-    blocks.iter().map(|block| block_start(block, objective)).collect()
+pub(crate) fn start(program: &Program, objective: &[f64]) -> Vec<(Vec<f64>, Vec<f64>)> {
+    program.blocks.iter().map(|block| block_start(block, objective, program)).collect()
 }
 
-fn block_start(block: &Block, objective: &[f64]) -> (Vec<f64>, Vec<f64>) {
+fn block_start(block: &Block, objective: &[f64], program: &Program) -> (Vec<f64>, Vec<f64>) {
     let n = block.size();
-    let d = balance(block);
+    let d = if program.balanced { vec![1.0; n] } else { balance(block) };
     let mut norms = vec![0.0; objective.len()];
     block.norms(&d, &mut norms);
+    norms.iter_mut().zip(&program.scale).for_each(|(norm, s)| *norm *= s);
     let size = n as f64;
     let constant = scaled_norm(block, &d);
     let largest = norms.iter().copied().fold(constant, f64::max);
@@ -36,7 +37,12 @@ fn block_start(block: &Block, objective: &[f64]) -> (Vec<f64>, Vec<f64>) {
 /// The diagonal of D.
 fn balance(block: &Block) -> Vec<f64> {
     let n = block.size();
-    let magnitudes = block.magnitudes();
+    let mut magnitudes = vec![0.0_f64; block.constant().len()];
+    block.entries(&mut |i, j, _, value| {
+        for at in if block.is_diagonal() { [i, i] } else { [i + j * n, j + i * n] } {
+            magnitudes[at] = magnitudes[at].max(value.abs());
+        }
+    });
     let mut d = vec![1.0; n];
     if block.is_diagonal() {
         for (d, m) in d.iter_mut().zip(&magnitudes) {

@@ -1,11 +1,13 @@
 //! Certificates: multipliers that exclude every x, directions of x without end.
 
-use super::{CERTIFICATE, Iteration, Status, nan_max};
+use super::{Iteration, Status, nan_max};
 use crate::dense::{dot, norm};
 use crate::direction::BlockState;
 use crate::schur::Schur;
 use faer::{Mat, Side};
 
+/// Largest change of the blocks along a ray against that of the objective.
+const RAY: f64 = 1e-8;
 /// Most unknowns for which an eigendecomposition of the Gram matrix is taken.
 const MOST_FOR_NULL_SPACE: usize = 500;
 
@@ -27,7 +29,7 @@ impl Iteration<'_> {
         let far = -status.objective;
         // F(x) − F(0) = S + R − C, and S is positive definite.
         let defect = self.blocks.iter().zip(&self.constant_norms).map(|(b, c)| (norm(&b.residual) + c) / far);
-        (defect.fold(0.0, nan_max) <= CERTIFICATE).then(|| self.x.iter().map(|x| x / far).collect())
+        (defect.fold(0.0, nan_max) <= RAY).then(|| self.x.iter().map(|x| x / far).collect())
     }
 
     /// Moves Z by the smallest F(y) that gives A(Z) = 0. True when it stays positive definite and its dual objective positive: Z is then an
@@ -41,9 +43,10 @@ impl Iteration<'_> {
         };
         gram.solve(&self.az, &mut self.change);
         self.change.iter_mut().for_each(|y| *y = -*y);
+        super::product(self.scale, &self.change, &mut self.unscaled);
         let mut definite = true;
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-            state.propose_dual(block, &self.change);
+            state.propose_dual(block, &self.unscaled);
             definite = definite && state.try_dual(1.0, &mut self.scratch);
         }
         let objective = |state: &BlockState, c: &[f64], step: f64| -dot(c, &state.z) - step * dot(c, &state.dz);
@@ -90,6 +93,7 @@ impl Iteration<'_> {
                 let identity = state.identity();
                 block.schur(&identity, &identity, &mut gram.matrix, unknowns, &mut state.operator);
             }
+            gram.scale_by(self.scale);
             if !gram.factorize(0.0) {
                 return None;
             }

@@ -7,5 +7,6 @@ mod plants;
 mod quadrotor;
 mod random;
 mod regulator;
+mod scaling;
 mod sdpa_format;
 mod sdplib;

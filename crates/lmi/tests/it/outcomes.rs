@@ -34,10 +34,49 @@ fn an_unstable_matrix_has_none_and_the_witness_proves_it() {
     let coefficient = bound - &a * decay - decay * a.transpose();
     assert!(coefficient.norm_max() < 1e-6, "{coefficient:?}");
     assert!((bound[(0, 0)] + bound[(1, 1)] - 1.0).abs() < 1e-6);
-    assert!(witness.residual < 1e-6 && witness.smallest_eigenvalue > -1e-9);
+    assert!(witness.residual < 1e-9 && witness.excluded_radius > 1e10 && witness.smallest_eigenvalue >= 0.0);
     for z in &witness.multipliers {
         assert!(z.self_adjoint_eigenvalues(faer::Side::Lower).unwrap()[0] > -1e-9);
     }
+}
+
+/// Feasible, but by less than the default margin: infeasibility must not be claimed.
+#[test]
+fn the_default_margin_decides_nothing() {
+    let mut problem = Problem::new();
+    let t = problem.scalar("t");
+    let thin = matrix([[1.0, 1.0], [1.0, 1.0 + 1e-14]]);
+    problem.positive_definite("thin", &thin + t.times(&Mat::zeros(2, 2)));
+    problem.positive_definite("0 < t", t.clone());
+    problem.positive_definite("t < 1", Expr::identity(1) - &t);
+    let answer = problem.solve(&Options::default()).unwrap();
+    assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
+    assert!(answer.blocks[0].verified_lower_bound > 1e-15 && answer.blocks[0].verified_lower_bound < 1e-14);
+}
+
+#[test]
+fn an_explanation_names_what_contradicts() {
+    // 3 < t and t < 1 contradict by 2; each alone has to give way by 2, both together by 1 each.
+    let mut problem = Problem::new();
+    let (t, u) = (problem.scalar("t"), problem.scalar("u"));
+    problem.positive_definite("3 < t", &t - matrix([[3.0]]));
+    problem.positive_definite("t < 1", matrix([[1.0]]) - &t);
+    problem.positive_definite("u < 7", matrix([[7.0]]) - &u);
+    let answer = problem.solve(&Options::default()).unwrap();
+    let why = problem.explain(&answer, &Options::default()).unwrap().expect("an infeasible answer");
+    assert!((why.distance - 1.0).abs() < 1e-6, "{why}");
+    assert_eq!(why.carriers.len(), 2);
+    for carrier in &why.carriers {
+        assert!((carrier.share - 0.5).abs() < 1e-6 && (carrier.alone.unwrap() - 2.0).abs() < 1e-6, "{why}");
+    }
+    let text = why.to_string();
+    assert!(text.contains("3 < t") && text.contains("50.0 %") && text.contains("relax \""), "{text}");
+    // Nothing to explain.
+    let mut problem = Problem::new();
+    let t = problem.scalar("t");
+    problem.positive_definite("t > 0", t);
+    let answer = problem.solve(&Options::default()).unwrap();
+    assert!(problem.explain(&answer, &Options::default()).unwrap().is_none());
 }
 
 #[test]

@@ -1,0 +1,275 @@
+//! Balancing: every block is replaced by `D F D` and every unknown by `xᵢ = sᵢ x̃ᵢ`, with D diagonal, and the objective by a
+//! multiple, so that the coefficients of the problem are about 1.
+//!
+//! All factors are powers of two, so that nothing is rounded, and are undone after solving: `x = s∘x̃`, `Z = D Z̃ D / ω`. They are
+//! the least-squares solution of `log dᵢ + log dⱼ + log s_k + log|F_k,ij| = 0` over all nonzero entries (`s₀ = 1` for the known
+//! part), after Curtis and Reid (J. Inst. Math. Appl. 10, 1972). Unlike equilibration by the largest entry this solution is
+//! unique up to what does not matter, and a problem stated in other units gives the same balanced one.
+
+use crate::Options;
+use crate::answer::{Balancing, InaccurateReason, Residuals};
+use crate::block::Program;
+use crate::interior_point::{self, Ending, Solution};
+
+/// Rounds of conjugate gradients for the logarithms of the factors, which need no more than one digit.
+const ROUNDS: usize = 40;
+/// Rows, unknowns and costs that differ more than this in size are balanced from the beginning.
+const WIDE: f64 = 1e5;
+/// Relative gap at which a stalled iteration is worth another attempt.
+const FAR_OFF: f64 = 1e-4;
+/// Largest exponent of a factor: what can be squared and multiplied without overflow.
+const MOST: f64 = 120.0;
+/// Largest binary exponent of a coefficient that is taken for what it says.
+const EXTREME: f64 = 400.0;
+
+/// `dᵢ dⱼ s_k |F_k,ij|` is to be 1.
+#[derive(Clone, Copy, Debug)]
+struct Equation {
+    i: usize,
+    j: usize,
+    /// Place of s_k among the variables.
+    unknown: Option<usize>,
+    /// log₂|F_k,ij|.
+    log: f64,
+}
+
+/// Factors of one problem.
+struct Factors {
+    /// The diagonal of D, block after block.
+    rows: Vec<f64>,
+    unknowns: Vec<f64>,
+}
+
+/// Solves a program with the margin of each block, balanced where its data or the course of the iteration ask for it.
+///
+/// Most problems are stated in sensible units, and the iteration does well on them as they are. It begins with the balanced
+/// problem where rows or unknowns differ widely in size, and turns to the other form where it stalls far from the end.
+/// Margins are tiny and have no say in what the balanced program looks like.
+pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) -> (Solution, Balancing) {
+    let equations = equations(&program);
+    let before = range(&equations);
+    let untouched = Balancing { before, after: before };
+    let wide = spread(&program, &equations) > WIDE;
+    program.blocks.iter_mut().zip(margins).for_each(|(block, margin)| block.subtract(*margin));
+    let mut factors = None;
+    let mut with_units = |mut solution: Solution, program: &Program| {
+        // What the multipliers of an infeasible problem exclude is told in the units of the balanced one.
+        if matches!(solution.ending, Ending::PrimalInfeasible) {
+            solution.units = factors.get_or_insert_with(|| self::factors(program, &equations)).unknowns.clone();
+        }
+        solution
+    };
+    let plain = (!wide).then(|| with_units(interior_point::solve(&program, options), &program));
+    let plain = match plain {
+        Some(solution) if !far_off(&solution, options) => return (solution, untouched),
+        other => other,
+    };
+    let factors = factors.unwrap_or_else(|| self::factors(&program, &equations));
+    let after = range_after(&equations, &factors);
+    let balanced = solve_scaled(&mut program, &factors, options);
+    match (plain, balanced) {
+        (None, Some(balanced)) if !far_off(&balanced, options) => (balanced, Balancing { before, after }),
+        (None, Some(balanced)) => {
+            unscale_program(&mut program, &factors);
+            let mut plain = interior_point::solve(&program, options);
+            plain.units = factors.unknowns;
+            if closer(&plain, &balanced) { (plain, untouched) } else { (balanced, Balancing { before, after }) }
+        }
+        (Some(plain), Some(balanced)) if closer(&balanced, &plain) => (balanced, Balancing { before, after }),
+        (Some(plain), _) => (plain, untouched),
+        (None, None) => (interior_point::solve(&program, options), untouched),
+    }
+}
+
+/// Whether the iteration gave up far from an answer.
+fn far_off(solution: &Solution, options: &Options) -> bool {
+    let Residuals { primal, dual, gap } = solution.residuals;
+    let near = primal.max(dual) <= 10.0 * options.feasibility_tolerance && gap <= FAR_OFF;
+    matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled)) && !near
+}
+
+/// Whether the first of two solutions is the better one.
+fn closer(a: &Solution, b: &Solution) -> bool {
+    let stalled = |s: &Solution| matches!(s.ending, Ending::Stopped(_));
+    let distance = |s: &Solution| s.residuals.primal.max(s.residuals.dual).max(s.residuals.gap);
+    match (stalled(a), stalled(b)) {
+        (false, true) => true,
+        (true, false) => false,
+        _ => distance(a) < distance(b),
+    }
+}
+
+/// Scales the program, solves it, and gives the solution in the units of the program as it was; `None` where scaling overflows.
+fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> Option<Solution> {
+    let omega = apply(program, factors)?;
+    let mut solution = interior_point::solve(program, options);
+    let unscale = |x: &mut Vec<f64>| x.iter_mut().zip(&factors.unknowns).for_each(|(x, s)| *x *= s);
+    unscale(&mut solution.point.x);
+    solution.interior.iter_mut().for_each(unscale);
+    if let Ending::DualInfeasible(ray) = &mut solution.ending {
+        unscale(ray);
+    }
+    let mut first = 0;
+    for (block, z) in program.blocks.iter().zip(&mut solution.point.z) {
+        let n = block.size();
+        let d = &factors.rows[first..first + n];
+        first += n;
+        for (at, z) in z.iter_mut().enumerate() {
+            let (i, j) = if block.is_diagonal() { (at, at) } else { (at % n, at / n) };
+            *z = *z * d[i] * d[j] / omega;
+        }
+    }
+    solution.dual_objective /= omega;
+    for entry in &mut solution.log {
+        entry.objective /= omega;
+        entry.dual_objective /= omega;
+    }
+    Some(solution)
+}
+
+/// Undoes what [`apply`] did.
+fn unscale_program(program: &mut Program, factors: &Factors) {
+    let mut first = 0;
+    for block in &mut program.blocks {
+        let inverse: Vec<f64> = factors.rows[first..first + block.size()].iter().map(|d| 1.0 / d).collect();
+        first += block.size();
+        block.scale(&inverse);
+    }
+    let omega = program.omega;
+    program.objective.iter_mut().zip(&factors.unknowns).for_each(|(c, s)| *c /= s * omega);
+    program.scale.fill(1.0);
+    (program.omega, program.balanced) = (1.0, false);
+}
+
+/// By how much rows and unknowns differ in size: the ratio of the largest to the smallest of their largest coefficients.
+fn spread(program: &Program, equations: &[Equation]) -> f64 {
+    let rows: usize = program.blocks.iter().map(|block| block.size()).sum();
+    let unknowns = rows + program.objective.len();
+    // Rows of the coefficient matrices, unknowns, rows of the known parts.
+    let mut largest = vec![f64::NEG_INFINITY; unknowns + rows];
+    for e in equations {
+        let places = match e.unknown {
+            Some(k) => [e.i, e.j, k],
+            None => [unknowns + e.i, unknowns + e.j, unknowns + e.j],
+        };
+        places.into_iter().for_each(|at| largest[at] = largest[at].max(e.log));
+    }
+    let costs = program.objective.iter().map(|c| c.abs().log2()).fold(f64::NEG_INFINITY, f64::max);
+    let known = || largest.iter().copied().chain([costs]).filter(|log| log.is_finite());
+    let (least, most) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
+    (most - least).exp2()
+}
+
+fn equations(program: &Program) -> Vec<Equation> {
+    let rows: usize = program.blocks.iter().map(|block| block.size()).sum();
+    let (mut out, mut first) = (Vec::new(), 0);
+    for block in &program.blocks {
+        block.entries(&mut |i, j, unknown, value| {
+            let scale = unknown.map_or(1.0, |unknown| program.scale[unknown]);
+            let log = value.abs().log2() + scale.log2();
+            if value != 0.0 && log.is_finite() {
+                out.push(Equation { i: first + i, j: first + j, unknown: unknown.map(|k| rows + k), log });
+            }
+        });
+        first += block.size();
+    }
+    out
+}
+
+/// Smallest and largest coefficient.
+fn range(equations: &[Equation]) -> (f64, f64) {
+    let smallest = equations.iter().map(|e| e.log).fold(f64::INFINITY, f64::min);
+    let largest = equations.iter().map(|e| e.log).fold(f64::NEG_INFINITY, f64::max);
+    if equations.is_empty() { (0.0, 0.0) } else { (smallest.exp2(), largest.exp2()) }
+}
+
+/// The same of the scaled problem.
+fn range_after(equations: &[Equation], factors: &Factors) -> (f64, f64) {
+    let rows = factors.rows.len();
+    let scaled = |e: &Equation| {
+        let unknown = e.unknown.map_or(0.0, |k| factors.unknowns[k - rows].log2());
+        Equation { log: e.log + factors.rows[e.i].log2() + factors.rows[e.j].log2() + unknown, ..*e }
+    };
+    range(&equations.iter().map(scaled).collect::<Vec<_>>())
+}
+
+/// The least-squares solution by conjugate gradients on the normal equations, preconditioned by their diagonal.
+fn factors(program: &Program, equations: &[Equation]) -> Factors {
+    let rows: usize = program.blocks.iter().map(|block| block.size()).sum();
+    let n = rows + program.objective.len();
+    let spread = |e: &Equation, value: f64, out: &mut [f64]| {
+        out[e.i] += value;
+        out[e.j] += value;
+        if let Some(k) = e.unknown {
+            out[k] += value;
+        }
+    };
+    let gather = |e: &Equation, v: &[f64]| v[e.i] + v[e.j] + e.unknown.map_or(0.0, |k| v[k]);
+    let (mut diagonal, mut residual) = (vec![0.0; n], vec![0.0; n]);
+    for e in equations {
+        diagonal[e.i] += if e.i == e.j { 4.0 } else { 1.0 };
+        diagonal[e.j] += if e.i == e.j { 0.0 } else { 1.0 };
+        if let Some(k) = e.unknown {
+            diagonal[k] += 1.0;
+        }
+        spread(e, -e.log.clamp(-EXTREME, EXTREME), &mut residual);
+    }
+    let precondition =
+        |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| if *d > 0.0 { r / d } else { 0.0 }).collect() };
+    let mut v = vec![0.0; n];
+    let mut direction = precondition(&residual);
+    let mut size = crate::dense::dot(&residual, &direction);
+    let start = size;
+    for _ in 0..ROUNDS {
+        if size <= 1e-8 * start || size <= 1e-6 {
+            break;
+        }
+        let mut image = vec![0.0; n];
+        for e in equations {
+            spread(e, gather(e, &direction), &mut image);
+        }
+        let step = size / crate::dense::dot(&direction, &image);
+        if !step.is_finite() {
+            break;
+        }
+        crate::dense::axpy(step, &direction, &mut v);
+        crate::dense::axpy(-step, &image, &mut residual);
+        let next = precondition(&residual);
+        let last = std::mem::replace(&mut size, crate::dense::dot(&residual, &next));
+        direction.iter_mut().zip(next).for_each(|(d, n)| *d = n + size / last * *d);
+    }
+    let power = |v: &f64, most: f64| v.round().clamp(-most, most).exp2();
+    Factors {
+        rows: v[..rows].iter().map(|v| power(v, MOST)).collect(),
+        unknowns: v[rows..].iter().map(|v| power(v, 2.0 * MOST)).collect(),
+    }
+}
+
+/// Scales the program and gives the factor ω of the objective; `None`, and the program as it was, when that would overflow.
+fn apply(program: &mut Program, factors: &Factors) -> Option<f64> {
+    let (mut first, mut sound) = (0, true);
+    for block in &program.blocks {
+        let d = &factors.rows[first..first + block.size()];
+        block.entries(&mut |i, j, unknown, value| {
+            let scaled = value * d[i] * d[j] * unknown.map_or(1.0, |k| factors.unknowns[k]);
+            sound &= value == 0.0 || scaled.abs() < 1e150;
+        });
+        first += block.size();
+    }
+    let costs = program.objective.iter().zip(&factors.unknowns).map(|(c, s)| (c * s).abs());
+    let largest = costs.fold(0.0, f64::max);
+    if !sound || !largest.is_finite() {
+        return None;
+    }
+    let omega = if largest > 0.0 { (-largest.log2().round()).clamp(-900.0, 900.0).exp2() } else { 1.0 };
+    first = 0;
+    for block in &mut program.blocks {
+        let n = block.size();
+        block.scale(&factors.rows[first..first + n]);
+        first += n;
+    }
+    program.objective.iter_mut().zip(&factors.unknowns).for_each(|(c, s)| *c *= s * omega);
+    program.scale.copy_from_slice(&factors.unknowns);
+    (program.omega, program.balanced) = (omega, true);
+    Some(omega)
+}

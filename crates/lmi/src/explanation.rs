@@ -1,0 +1,125 @@
+//! Why a problem has no solution, in terms of its own inequalities.
+
+use crate::answer::{Answer, Outcome};
+use crate::expression::Expr;
+use crate::problem::{Inequality, Problem};
+use crate::{Error, Mat, Options};
+use serde::Serialize;
+use std::fmt;
+
+/// Inequalities that are tried one by one.
+const TRIED: usize = 5;
+/// Least share of an inequality that is worth a word.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// How far a problem is from having a solution, and what stands in the way.
+#[derive(Clone, Debug, Serialize)]
+pub struct Explanation {
+    /// The least t with `F_b(x) + tI ⪰ margin·I` for every inequality b and some x.
+    pub distance: f64,
+    /// The inequalities that contradict each other, the one that weighs most first.
+    pub carriers: Vec<Carrier>,
+}
+
+/// One of the inequalities that contradict each other.
+#[derive(Clone, Debug, Serialize)]
+pub struct Carrier {
+    /// Its name.
+    pub name: String,
+    /// Its share `tr Z_b / Σ tr Z` in the multipliers of the least t: by so much falls t when `F_b ⪰ 0` is relaxed to `F_b ⪰ −1·I`,
+    /// for small relaxations.
+    pub share: f64,
+    /// The least t with which relaxing this inequality alone to `F_b ⪰ −tI` makes the problem solvable; `None` where that does not
+    /// help, or was not tried because the share is small.
+    pub alone: Option<f64>,
+}
+
+impl Explanation {
+    /// The inequality whose relaxation alone helps with the smallest change.
+    pub fn cheapest(&self) -> Option<&Carrier> {
+        let helping = self.carriers.iter().filter(|carrier| carrier.alone.is_some());
+        helping.min_by(|a, b| a.alone.unwrap_or(f64::INFINITY).total_cmp(&b.alone.unwrap_or(f64::INFINITY)))
+    }
+}
+
+impl fmt::Display for Explanation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "no solution: every inequality would have to give way by {:.3e}", self.distance)?;
+        for carrier in &self.carriers {
+            write!(f, "  {:5.1} %  {}", 100.0 * carrier.share, carrier.name)?;
+            match carrier.alone {
+                Some(t) => writeln!(f, ": relaxed alone by {t:.3e}, it would do")?,
+                None => writeln!(f)?,
+            }
+        }
+        match self.cheapest() {
+            Some(carrier) => write!(f, "relax \"{}\" first", carrier.name),
+            None => write!(f, "no inequality helps when it is relaxed alone"),
+        }
+    }
+}
+
+impl Problem {
+    /// Explains an answer that is [`Outcome::Infeasible`]; `None` for every other one, and where the least relaxation cannot be found.
+    ///
+    /// Solves the problem anew with its inequalities relaxed, all together and then one by one.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Problem::solve`].
+    pub fn explain(&self, answer: &Answer, options: &Options) -> Result<Option<Explanation>, Error> {
+        if !matches!(answer.outcome, Outcome::Infeasible(_)) {
+            return Ok(None);
+        }
+        let Some(together) = self.least_relaxation(&|_| true, options)? else {
+            return Ok(None);
+        };
+        let weight = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
+        let weights: Vec<f64> = together.multipliers.iter().map(weight).collect();
+        let total: f64 = weights.iter().sum();
+        let mut order: Vec<usize> = (0..self.inequalities.len()).collect();
+        order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
+        let mut carriers = Vec::new();
+        for (place, block) in order.into_iter().enumerate() {
+            let share = weights[block] / total;
+            if share.is_nan() || share < LEAST_SHARE {
+                break;
+            }
+            let alone = match place < TRIED {
+                true => self.least_relaxation(&|other| other == block, options)?.map(|answer| answer.objective),
+                false => None,
+            };
+            carriers.push(Carrier { name: self.inequalities[block].name.clone(), share, alone });
+        }
+        Ok(Some(Explanation { distance: together.objective, carriers }))
+    }
+
+    /// Minimises t with tI added to some inequalities.
+    fn least_relaxation(&self, relaxed: &dyn Fn(usize) -> bool, options: &Options) -> Result<Option<Answer>, Error> {
+        let mut problem = self.without_inequalities();
+        let t = problem.scalar("relaxation");
+        for (block, Inequality { name, expression, margin }) in self.inequalities.iter().enumerate() {
+            let n = expression.nrows();
+            let expression = match relaxed(block) {
+                true => expression + t.times(&Mat::identity(n, n)),
+                false => expression.clone(),
+            };
+            problem.inequalities.push(Inequality {
+                name: name.clone(),
+                expression,
+                margin: Some(margin.unwrap_or(0.0)),
+            });
+        }
+        // Inequalities relaxed beyond need would leave t without end where there is no contradiction.
+        let floor: Expr = &t + Expr::identity(1);
+        problem.positive_definite_by("relaxation", floor, 0.0);
+        problem.minimize(&t);
+        let mut answer = problem.solve(options)?;
+        answer.multipliers.pop();
+        let near =
+            |answer: &Answer| answer.residuals.primal.max(answer.residuals.dual).max(answer.residuals.gap) < 1e-4;
+        let found = matches!(answer.outcome, Outcome::Solved)
+            || (matches!(answer.outcome, Outcome::Inaccurate(_)) && near(&answer));
+        Ok(found.then_some(answer))
+    }
+}

@@ -1,0 +1,416 @@
+//! Proofs that symmetric matrices are positive definite, every rounding error accounted for.
+//!
+//! A matrix F known up to a radius, `|F − F̃| ≤ R` entry by entry, satisfies `F ⪰ cI` when the floating-point Cholesky factorisation
+//! of `D(F̃ − cI)D − diag(τ)` runs to its end, D diagonal with powers of two that bring the diagonal of F̃ near 1 and
+//!
+//! ```text
+//! τᵢ ≥ Σⱼ dᵢ Rᵢⱼ dⱼ + n · κ · maxⱼ dⱼ² F̃ⱼⱼ,     κ = γ/(1 − γ),  γ = (n + 1)υ/(1 − (n + 1)υ)
+//! ```
+//!
+//! for arithmetic of unit roundoff υ: a factorisation that ends is that of a matrix which differs by at most `κ√(bᵢᵢbⱼⱼ)`
+//! from the one given (Demmel 1989; Higham, Accuracy and Stability of Numerical Algorithms, Theorem 10.3; Rump, BIT 46, 2006), and
+//! `diag(Σⱼ Eᵢⱼ)` exceeds any symmetric matrix with entries of at most Eᵢⱼ. The arithmetic is double-double (υ = 2⁻¹⁰⁰), so
+//! that matrices are proved definite whose smallest eigenvalue is far below the rounding errors of `f64`.
+//!
+//! Nothing here is shared with the solver.
+
+use crate::Mat;
+use crate::double_double::{self as dd, Double, UNIT};
+use crate::expression::{Expr, Shape, Unknown};
+use crate::vectorized::vectorized;
+use crate::verification::Spectrum;
+
+/// Absolute error that underflow may leave in an entry, against the largest factor in its terms.
+const UNDERFLOW: f64 = 1e-290;
+/// Smallest pivot of a scaled matrix that is taken for positive; far below what τ lets pass.
+const LEAST_PIVOT: f64 = 1e-60;
+/// Least amount by which a negative bound stays below the estimate.
+const LEAST_ROUNDING: f64 = 1e-280;
+/// Halvings of the first guess when a lower bound is looked for.
+const HALVINGS: i32 = 120;
+
+/// A matrix with bounds on its entries. Column by column; of a diagonal matrix, the diagonal.
+#[derive(Clone, Debug)]
+pub(crate) struct Enclosure {
+    n: usize,
+    diagonal: bool,
+    high: Vec<f64>,
+    low: Vec<f64>,
+    /// Sum of the absolute values of the terms of each entry.
+    magnitude: Vec<f64>,
+    /// Most roundings that one term has been through.
+    roundings: f64,
+    /// Largest absolute factor in any term.
+    factor: f64,
+}
+
+impl Enclosure {
+    /// The n × n zero matrix.
+    pub fn zeros(n: usize, diagonal: bool) -> Self {
+        let len = if diagonal { n } else { n * n };
+        let zero = || vec![0.0; len];
+        Self { n, diagonal, high: zero(), low: zero(), magnitude: zero(), roundings: 4.0, factor: 1.0 }
+    }
+
+    /// Of a symmetric expression at the unknowns given, its symmetric part.
+    pub fn of_expression<'a>(expression: &Expr, value_of: &dyn Fn(Unknown) -> &'a Mat<f64>) -> Self {
+        let n = expression.nrows();
+        let mut sum = Self::zeros(n, false);
+        for j in 0..n {
+            for i in 0..n {
+                sum.add_product(i, j, expression.constant[(i, j)], 1.0);
+            }
+        }
+        for term in expression.terms.iter() {
+            sum.add_term(&term.shape, value_of(term.unknown));
+        }
+        sum.symmetrize();
+        sum
+    }
+
+    /// Of a known matrix, its symmetric part.
+    pub fn of_matrix(matrix: &Mat<f64>) -> Self {
+        let n = matrix.nrows();
+        let mut sum = Self::zeros(n, false);
+        for j in 0..n {
+            for i in 0..n {
+                sum.add_product(i, j, matrix[(i, j)], 1.0);
+            }
+        }
+        sum.symmetrize();
+        sum
+    }
+
+    /// Adds a·b to entry (i, j).
+    pub fn add_product(&mut self, i: usize, j: usize, a: f64, b: f64) {
+        let at = if self.diagonal { i } else { i + j * self.n };
+        let sum = dd::add(Double { h: self.high[at], l: self.low[at] }, dd::two_product(a, b));
+        (self.high[at], self.low[at]) = (sum.h, sum.l);
+        self.magnitude[at] += (a * b).abs();
+        self.factor = self.factor.max(a.abs()).max(b.abs());
+    }
+
+    /// Counts terms added one by one with [`Self::add_product`].
+    pub fn count(&mut self, terms: usize) {
+        self.roundings += terms as f64;
+    }
+
+    fn add_term(&mut self, shape: &Shape, x: &Mat<f64>) {
+        let n = self.n;
+        let largest = crate::verification::largest_entry;
+        match shape {
+            Shape::Product { left, transposed, right } => {
+                let x = if *transposed { x.transpose().to_owned() } else { x.clone() };
+                let (r, c) = (x.nrows(), x.ncols());
+                let (left, middle, right) = (columns(left), columns(&x), columns(right));
+                let size = |m: &[f64]| m.iter().fold(1.0_f64, |most, e| most.max(e.abs()));
+                self.factor = self.factor.max(size(&left) * size(&middle)).max(size(&middle) * size(&right));
+                self.factor = self.factor.max(size(&right) * size(&left));
+                triple_product(
+                    [n, n],
+                    [r, c],
+                    [&left, &middle, &right],
+                    [&mut self.high, &mut self.low, &mut self.magnitude],
+                );
+                self.roundings += (r + c + 4) as f64;
+            }
+            Shape::Scaled { weights, matrix } => {
+                let (mut sum, mut magnitude) = (Double::default(), 0.0);
+                for j in 0..weights.ncols() {
+                    for i in 0..weights.nrows() {
+                        sum = dd::add(sum, dd::two_product(weights[(i, j)], x[(i, j)]));
+                        magnitude += (weights[(i, j)] * x[(i, j)]).abs();
+                    }
+                }
+                for j in 0..n {
+                    for i in 0..n {
+                        let at = i + j * n;
+                        let term = dd::multiply_by(sum, matrix[(i, j)]);
+                        let total = dd::add(Double { h: self.high[at], l: self.low[at] }, term);
+                        (self.high[at], self.low[at]) = (total.h, total.l);
+                        self.magnitude[at] += magnitude * matrix[(i, j)].abs();
+                    }
+                }
+                self.factor = self.factor.max(largest(weights)).max(largest(x)).max(largest(matrix));
+                self.roundings += (weights.nrows() * weights.ncols() + 4) as f64;
+            }
+        }
+    }
+
+    fn symmetrize(&mut self) {
+        let n = self.n;
+        for j in 0..n {
+            for i in 0..j {
+                let (a, b) = (i + j * n, j + i * n);
+                let sum = dd::add(
+                    Double { h: 0.5 * self.high[a], l: 0.5 * self.low[a] },
+                    Double { h: 0.5 * self.high[b], l: 0.5 * self.low[b] },
+                );
+                let magnitude = 0.5 * (self.magnitude[a] + self.magnitude[b]);
+                for at in [a, b] {
+                    (self.high[at], self.low[at], self.magnitude[at]) = (sum.h, sum.l, magnitude);
+                }
+            }
+        }
+        self.roundings += 1.0;
+    }
+
+    /// Upper bounds on the absolute entries, of a diagonal matrix those of its diagonal.
+    pub fn absolute_bounds(&self) -> Vec<f64> {
+        let bound = |at: usize| 1.001 * (self.high[at].abs() + self.low[at].abs() + self.radius(at));
+        (0..self.high.len()).map(bound).collect()
+    }
+
+    /// Bound on the distance of an entry from its true value: γ_k Σ|terms|, rounded up.
+    fn radius(&self, at: usize) -> f64 {
+        2.0 * self.roundings * UNIT * self.magnitude[at] + UNDERFLOW * self.factor * self.roundings
+    }
+
+    /// A proved lower bound on the smallest eigenvalue, −∞ where none is found.
+    ///
+    /// The closer the estimate, the fewer the factorisations; a wrong one costs time or sharpness, never truth.
+    pub fn smallest_eigenvalue_bound(&self, estimate: &Spectrum) -> f64 {
+        if self.n == 0 {
+            return f64::INFINITY;
+        }
+        if self.diagonal {
+            let entry = |at: usize| {
+                let (value, radius) = (self.high[at] + self.low[at], self.radius(at));
+                value - radius - 4.0 * f64::EPSILON * (value.abs() + radius)
+            };
+            let smallest =
+                (0..self.n).map(entry).fold(f64::INFINITY, |m, e| if e.is_nan() { f64::NAN } else { m.min(e) });
+            return if smallest.is_nan() { f64::NEG_INFINITY } else { smallest };
+        }
+        let Spectrum { smallest, rounding, .. } = *estimate;
+        if !(smallest.is_finite() && rounding.is_finite()) {
+            return f64::NEG_INFINITY;
+        }
+        let cautious = smallest - 0.5 * rounding;
+        if cautious > 0.5 * smallest && self.exceeds(cautious) {
+            return cautious;
+        }
+        // The estimate is lost in rounding errors: halve until the proof succeeds.
+        let top = smallest.abs().max(rounding).max(f64::MIN_POSITIVE);
+        let shift = |halvings: i32| top * 0.5_f64.powi(halvings);
+        if self.exceeds(shift(HALVINGS)) {
+            let (mut fails, mut holds) = (-1, HALVINGS);
+            while holds - fails > 1 {
+                let middle = (holds + fails) / 2;
+                if self.exceeds(shift(middle)) { holds = middle } else { fails = middle }
+            }
+            return shift(holds);
+        }
+        let below = [1.0, 2.0, 8.0].map(|factor| smallest.min(0.0) - factor * rounding.max(LEAST_ROUNDING));
+        below.into_iter().find(|&shift| self.exceeds(shift)).unwrap_or(f64::NEG_INFINITY)
+    }
+
+    /// Whether the matrix minus `shift`·I is proved to be positive definite.
+    pub fn exceeds(&self, shift: f64) -> bool {
+        let n = self.n;
+        let mut exponents = Vec::with_capacity(n);
+        for i in 0..n {
+            let entry = self.high[i + i * n] - shift.min(0.0);
+            if !(entry > 0.0 && entry.is_finite() && shift.is_finite()) {
+                return false;
+            }
+            exponents.push((-0.5 * entry.log2()).round() as i32);
+        }
+        let mut high = vec![0.0; n * n];
+        let mut low = vec![0.0; n * n];
+        let mut errors = vec![0.0; n];
+        for j in 0..n {
+            for i in 0..n {
+                let (at, exponent) = (i + j * n, exponents[i] + exponents[j]);
+                (high[at], low[at]) = (scaled(self.high[at], exponent), scaled(self.low[at], exponent));
+                errors[i] += scaled(self.radius(at), exponent) + UNDERFLOW;
+                // A shift that exceeds the diagonal is caught by the factorisation.
+                if i == j {
+                    let shift = scaled(shift, exponent);
+                    let entry = dd::add(Double { h: high[at], l: low[at] }, Double { h: -shift, l: 0.0 });
+                    errors[i] += 2.0 * UNIT * (entry.h.abs() + shift.abs()) + UNDERFLOW;
+                    (high[at], low[at]) = (entry.h, entry.l);
+                }
+            }
+        }
+        let largest = (0..n).map(|i| high[i + i * n]).fold(1.0, f64::max);
+        let gamma = (n + 1) as f64 * UNIT;
+        // n κ max b, doubled for the rounding of this line and of the subtraction below.
+        let backward = 2.0 * n as f64 * gamma / (1.0 - 4.0 * gamma) * largest + 4.0 * UNIT * largest;
+        for (i, error) in errors.iter().enumerate() {
+            let at = i + i * n;
+            let tau = 1.001 * (error + backward);
+            let entry = dd::add(Double { h: high[at], l: low[at] }, Double { h: -tau, l: 0.0 });
+            if !entry.h.is_finite() {
+                return false;
+            }
+            (high[at], low[at]) = (entry.h, entry.l);
+        }
+        factorizes(n, &mut high, &mut low)
+    }
+}
+
+/// The gradient of `Σ_b⟨F_b, Z_b⟩` with respect to each matrix unknown, with bounds on its errors.
+pub(crate) struct Gradient {
+    /// Approximate gradients, one matrix per unknown.
+    pub values: Vec<Mat<f64>>,
+    /// By how much they may be wrong.
+    pub radii: Vec<Mat<f64>>,
+}
+
+impl Gradient {
+    /// Of `Σ_b⟨F_b, Z_b⟩` for symmetric Z_b.
+    pub fn new<'a>(unknowns: &[Unknown], terms: impl Iterator<Item = (&'a Expr, &'a Mat<f64>)>) -> Self {
+        let zero = || -> Vec<Vec<f64>> { unknowns.iter().map(|u| vec![0.0; u.rows * u.cols]).collect() };
+        let (mut high, mut low, mut magnitude) = (zero(), zero(), zero());
+        let (mut roundings, mut factor) = (8.0, 1.0_f64);
+        for (expression, z) in terms {
+            let size = crate::verification::largest_entry;
+            for term in expression.terms.iter() {
+                let at = term.unknown.index;
+                let sums = [&mut high[at][..], &mut low[at][..], &mut magnitude[at][..]];
+                let n = z.nrows();
+                match &term.shape {
+                    Shape::Product { left, transposed, right } => {
+                        // ⟨Z, U X V⟩ = ⟨Uᵀ Z Vᵀ, X⟩ and ⟨Z, U Xᵀ V⟩ = ⟨V Z U, X⟩.
+                        let (u, v) = if *transposed {
+                            (right.clone(), left.clone())
+                        } else {
+                            (left.transpose().to_owned(), right.transpose().to_owned())
+                        };
+                        factor = factor.max(size(&u) * size(&v)).max(size(z) * size(&v)).max(size(z) * size(&u));
+                        let outer = [u.nrows(), v.ncols()];
+                        triple_product(outer, [n, n], [&columns(&u), &columns(z), &columns(&v)], sums);
+                        roundings += (2 * n + 4) as f64;
+                    }
+                    Shape::Scaled { weights, matrix } => {
+                        let (mut inner, mut sum) = (Double::default(), 0.0);
+                        for j in 0..n {
+                            for i in 0..n {
+                                inner = dd::add(inner, dd::two_product(matrix[(i, j)], z[(i, j)]));
+                                sum += (matrix[(i, j)] * z[(i, j)]).abs();
+                            }
+                        }
+                        let [high, low, magnitude] = sums;
+                        for (k, weight) in columns(weights).into_iter().enumerate() {
+                            let value = dd::add(Double { h: high[k], l: low[k] }, dd::multiply_by(inner, weight));
+                            (high[k], low[k]) = (value.h, value.l);
+                            magnitude[k] += sum * weight.abs();
+                        }
+                        factor = factor.max(size(weights)).max(size(matrix)).max(size(z));
+                        roundings += (n * n + 4) as f64;
+                    }
+                }
+            }
+        }
+        let matrix = |u: &Unknown, m: &[f64]| Mat::from_fn(u.rows, u.cols, |i, j| m[i + j * u.rows]);
+        let values = unknowns.iter().zip(&high).map(|(u, m)| matrix(u, m)).collect();
+        let radii = unknowns.iter().zip(high.iter().zip(&low).zip(&magnitude)).map(|(u, ((h, l), m))| {
+            // The rounding of sums of two entries of a symmetric unknown included.
+            let radius = |k: usize| {
+                2.0 * roundings * UNIT * m[k]
+                    + UNDERFLOW * factor * roundings
+                    + l[k].abs()
+                    + 4.0 * f64::EPSILON * h[k].abs()
+            };
+            Mat::from_fn(u.rows, u.cols, |i, j| radius(i + j * u.rows))
+        });
+        let radii = radii.collect();
+        Self { values, radii }
+    }
+}
+
+/// The entries column by column.
+fn columns(m: &Mat<f64>) -> Vec<f64> {
+    (0..m.ncols()).flat_map(|j| (0..m.nrows()).map(move |i| (i, j))).map(|(i, j)| m[(i, j)]).collect()
+}
+
+/// value · 2^exponent, without losing bits on the way when the result is a normal number.
+fn scaled(value: f64, exponent: i32) -> f64 {
+    let half = exponent / 2;
+    value * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half)
+}
+
+vectorized! {
+    /// sum ← sum + L X R for n × r, r × c and c × m matrices, and the same of absolute values.
+    fn triple_product<'a>(outer: [usize; 2], inner: [usize; 2], factors: [&'a [f64]; 3], sums: [&'a mut [f64]; 3]) {
+        let ([n, m], [r, c]) = (outer, inner);
+        let [left, x, right] = factors;
+        let [high, low, magnitude] = sums;
+        let mut t_high = vec![0.0; n * c];
+        let mut t_low = vec![0.0; n * c];
+        let mut t_magnitude = vec![0.0; n * c];
+        for l in 0..c {
+            let (th, tl, tm) = (&mut t_high[l * n..(l + 1) * n], &mut t_low[l * n..(l + 1) * n], &mut t_magnitude[l * n..(l + 1) * n]);
+            for k in 0..r {
+                let factor = x[k + l * r];
+                if factor == 0.0 {
+                    continue;
+                }
+                let column = &left[k * n..(k + 1) * n];
+                for i in 0..n {
+                    if column[i] == 0.0 {
+                        continue;
+                    }
+                    let term = dd::two_product(column[i], factor);
+                    let sum = dd::add(Double { h: th[i], l: tl[i] }, term);
+                    (th[i], tl[i]) = (sum.h, sum.l);
+                    tm[i] += term.h.abs();
+                }
+            }
+        }
+        for j in 0..m {
+            let (fh, fl, fm) = (&mut high[j * n..(j + 1) * n], &mut low[j * n..(j + 1) * n], &mut magnitude[j * n..(j + 1) * n]);
+            for l in 0..c {
+                let factor = right[l + j * c];
+                if factor == 0.0 {
+                    continue;
+                }
+                let (th, tl, tm) = (&t_high[l * n..(l + 1) * n], &t_low[l * n..(l + 1) * n], &t_magnitude[l * n..(l + 1) * n]);
+                for i in 0..n {
+                    let term = dd::multiply_by(Double { h: th[i], l: tl[i] }, factor);
+                    let sum = dd::add(Double { h: fh[i], l: fl[i] }, term);
+                    (fh[i], fl[i]) = (sum.h, sum.l);
+                    fm[i] += tm[i] * factor.abs();
+                }
+            }
+        }
+    }
+}
+
+vectorized! {
+    /// Whether the Cholesky factorisation of the lower triangle runs to its end.
+    fn factorizes<'a>(n: usize, high: &'a mut [f64], low: &'a mut [f64]) -> bool {
+        for k in 0..n {
+            let pivot = Double { h: high[k + k * n], l: low[k + k * n] };
+            if !(pivot.h > LEAST_PIVOT && pivot.h.is_finite()) {
+                return false;
+            }
+            let inverse = dd::reciprocal(dd::square_root(pivot));
+            for i in k + 1..n {
+                let entry = dd::multiply(Double { h: high[i + k * n], l: low[i + k * n] }, inverse);
+                (high[i + k * n], low[i + k * n]) = (entry.h, entry.l);
+            }
+            let (done_high, left_high) = high.split_at_mut((k + 1) * n);
+            let (done_low, left_low) = low.split_at_mut((k + 1) * n);
+            let (lh, ll) = (&done_high[k * n..], &done_low[k * n..]);
+            for j in k + 1..n {
+                let factor = Double { h: -lh[j], l: -ll[j] };
+                if factor.h == 0.0 {
+                    continue;
+                }
+                let at = (j - k - 1) * n;
+                let (ah, al) = (&mut left_high[at + j..at + n], &mut left_low[at + j..at + n]);
+                for (((ah, al), lh), ll) in ah.iter_mut().zip(al).zip(&lh[j..]).zip(&ll[j..]) {
+                    let product = dd::multiply(Double { h: *lh, l: *ll }, factor);
+                    let sum = dd::add(Double { h: *ah, l: *al }, product);
+                    (*ah, *al) = (sum.h, sum.l);
+                }
+            }
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;
