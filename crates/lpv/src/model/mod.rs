@@ -3,9 +3,11 @@
 //! [`FrozenModel`] is the linearisation at one parameter value, [`GridModel`] a grid of them, [`PolytopicModel`] the
 //! hull of the features that the matrices are affine in. Nothing here designs or simulates.
 
+mod basis;
 mod grid;
 mod polytopic;
 
+pub use basis::{BasisFunction, MatrixFunction};
 pub use grid::{FrozenModel, GridModel, linearize, parameter_grid};
 pub use polytopic::{BoxWeights, PolytopicModel};
 
