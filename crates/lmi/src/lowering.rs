@@ -299,10 +299,10 @@ impl Product {
 
     /// The term written with the given right factor, when it can be.
     fn with_right_factor(&self, v: &Mat<f64>) -> Option<Self> {
-        if self.v == *v {
+        if same(&self.v, v) {
             return Some(self.clone());
         }
-        self.flipped().filter(|flipped| flipped.v == *v)
+        self.flipped().filter(|flipped| same(&flipped.v, v))
     }
 }
 
@@ -345,7 +345,7 @@ fn merge_left_factors(products: Vec<Product>) -> Vec<Product> {
     let distinct = |unknown: Unknown, pick: fn(&Product) -> &Mat<f64>| {
         let mut seen: Vec<&Mat<f64>> = Vec::new();
         for product in products.iter().filter(|p| p.unknown == unknown) {
-            if !seen.contains(&pick(product)) {
+            if !seen.iter().any(|matrix| same(matrix, pick(product))) {
                 seen.push(pick(product));
             }
         }
@@ -357,8 +357,8 @@ fn merge_left_factors(products: Vec<Product>) -> Vec<Product> {
         .collect();
     let mut merged: Vec<Product> = Vec::new();
     for (product, prefers_left) in products.into_iter().zip(prefers_left) {
-        let same = |m: &&mut Product| prefers_left && m.unknown == product.unknown && m.u == product.u;
-        match merged.iter_mut().find(same) {
+        let fits = |m: &&mut Product| prefers_left && m.unknown == product.unknown && same(&m.u, &product.u);
+        match merged.iter_mut().find(fits) {
             Some(m) => m.v += &product.v,
             None => merged.push(product),
         }
@@ -370,7 +370,7 @@ fn most_frequent_right_factor(products: &[Product]) -> Mat<f64> {
     let mut counts: Vec<(Mat<f64>, usize)> = Vec::new();
     for product in products {
         for candidate in std::iter::once(product.clone()).chain(product.flipped()) {
-            match counts.iter_mut().find(|(v, _)| *v == candidate.v) {
+            match counts.iter_mut().find(|(v, _)| same(v, &candidate.v)) {
                 Some((_, count)) => *count += 1,
                 None => counts.push((candidate.v, 1)),
             }
@@ -384,6 +384,12 @@ fn most_frequent_right_factor(products: &[Product]) -> Mat<f64> {
         }
     }
     counts.swap_remove(best).0
+}
+
+/// Whether two matrices are equal. Factors of unknowns of different sizes meet in one block, and faer compares matrices of
+/// equal size only.
+fn same(a: &Mat<f64>, b: &Mat<f64>) -> bool {
+    (a.nrows(), a.ncols()) == (b.nrows(), b.ncols()) && a == b
 }
 
 fn nonzero_columns(m: &Mat<f64>) -> Vec<usize> {

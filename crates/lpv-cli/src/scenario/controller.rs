@@ -112,6 +112,7 @@ pub(super) fn controller(
             schedule: table.schedule,
             limits,
             sample_time_s: defaults.sample_time_s,
+            rate_bounded: None,
         },
         noise: table.noise,
         estimator: table.estimator.is_some(),

@@ -34,7 +34,7 @@ pub enum UnmetCondition {
         /// Level of the set.
         level: f64,
     },
-    /// The parameter moves, and the design is one of frozen parameters.
+    /// The parameter moves faster than the design is for; a frozen design is for a parameter at rest.
     ParameterMoves {
         /// At up to this rate, per second.
         rate: f64,
@@ -79,7 +79,8 @@ pub fn step_bound(design: &Design, scheduling: Option<&Scheduling>, step: &StepC
     let bound = quadratic_form(&p, step.error);
     let outside = level.filter(|&level| bound.is_nan() || bound > level).map(|level| UnmetCondition::Outside { level });
     let rate = step.peak_parameter_rate;
-    let moves = (rate.is_nan() || rate > REST_RATE).then_some(UnmetCondition::ParameterMoves { rate });
+    let allowed = design.rate_bounded.as_ref().map_or(REST_RATE, |bounded| bounded.rate);
+    let moves = (rate.is_nan() || rate > allowed).then_some(UnmetCondition::ParameterMoves { rate });
     let noise = step.noise.then_some(UnmetCondition::Noise);
     StepBound { bound, level, unmet: [outside, moves, noise].into_iter().flatten().collect() }
 }
@@ -96,8 +97,11 @@ pub fn unsaturated_level(p: &Mat<f64>, k: &Mat<f64>, sigma: &[f64]) -> f64 {
     (0..k.nrows()).map(level).fold(f64::INFINITY, f64::min)
 }
 
-/// P(ρ) of a frozen design.
+/// P(ρ): of a frozen design interpolated, of a rate-bounded one its inverse.
 fn lyapunov_matrix(design: &Design, scheduling: Option<&Scheduling>, rho: f64) -> Mat<f64> {
+    if let Some(p) = design.rate_bounded.as_ref().and_then(|bounded| bounded.p(rho)) {
+        return p;
+    }
     let parameters: Vec<f64> = design.points.iter().map(|point| point.rho).collect();
     let period = scheduling.filter(|s| s.periodic).map(|s| s.range[1] - s.range[0]);
     let n = design.points[0].p.nrows();

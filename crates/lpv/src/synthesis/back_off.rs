@@ -10,7 +10,7 @@
 //! and |kx| ≤ σ on xᵀPx ≤ γ becomes strict on (1 + ε)xᵀPx ≤ γ. The price is a cost bound larger, and a certified set
 //! smaller, by the factor 1 + ε.
 
-use super::{CostWeights, FrozenDesign};
+use super::{CostWeights, FrozenDesign, RateBounded};
 use crate::controller::Schedule;
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, quadratic_form};
@@ -41,7 +41,7 @@ pub(super) fn back_off(
             let p = scaled(&point.p, *factor);
             let unsaturated = point.auxiliary_gain.as_ref().unwrap_or(&gain);
             saturation.is_none_or(|saturation| stays_unsaturated(&p, unsaturated, saturation))
-                && mixtures_hold(model, weights, &p, &gain, point.auxiliary_gain.as_ref())
+                && mixtures_hold(model, weights, &p, &gain, point.auxiliary_gain.as_ref(), None)
         })
     };
     let factor = FACTORS.into_iter().find(suffices).unwrap_or(FACTORS[FACTORS.len() - 1]);
@@ -52,13 +52,14 @@ pub(super) fn back_off(
 }
 
 /// Whether every mixture S of the rows of K and F (K alone without an F) meets the cost bound xᵀPx:
-/// P(A − BS) + (A − BS)ᵀP + Q + SᵀRS ≺ 0 (A.48), by Cholesky factorisation.
+/// P(A − BS) + (A − BS)ᵀP ± Ṗ + Q + SᵀRS ≺ 0 (A.48), by Cholesky factorisation; Ṗ is `p_rate`, zero without it.
 pub(super) fn mixtures_hold(
     model: &FrozenModel,
     weights: &CostWeights,
     p: &Mat<f64>,
     k: &Mat<f64>,
     auxiliary: Option<&Mat<f64>>,
+    p_rate: Option<&Mat<f64>>,
 ) -> bool {
     let all = (1usize << k.nrows()) - 1;
     let vertices = if auxiliary.is_some() { 0..all + 1 } else { all..all + 1 };
@@ -67,8 +68,42 @@ pub(super) fn mixtures_hold(
         let s = Mat::from_fn(k.nrows(), k.ncols(), |i, j| if vertex >> i & 1 == 1 { k[(i, j)] } else { f[(i, j)] });
         let flow = p * (&model.a - &model.b * &s);
         let decrease = &flow + flow.transpose() + &weights.q + s.transpose() * &weights.r * &s;
-        inverse_spd(&Mat::from_fn(decrease.nrows(), decrease.ncols(), |i, j| -decrease[(i, j)])).is_some()
+        let is_negative = |matrix: Mat<f64>| {
+            inverse_spd(&Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| -matrix[(i, j)])).is_some()
+        };
+        match p_rate {
+            None => is_negative(decrease),
+            Some(rate) => is_negative(&decrease + rate) && is_negative(&decrease - rate),
+        }
     })
+}
+
+/// [`back_off`] for a parameter that moves, over the linearisations `models` between the grid points too: the least ε for
+/// which everything holds with the scheduled gain at both ends of the rate interval; `None` if none of them up to 10⁻³
+/// does.
+pub(super) fn back_off_moving(
+    lyapunov: &mut RateBounded,
+    models: &[FrozenModel],
+    weights: &CostWeights,
+    schedule: &Schedule,
+    is_high_gain: bool,
+    saturation: Option<&Saturation>,
+) -> Option<f64> {
+    let suffices = |factor: &f64| {
+        let mut scaled = lyapunov.clone();
+        scaled.back_off(1.0 + factor);
+        models.iter().all(|model| {
+            let (Some(p), Some(p_rate)) = (scaled.p(model.rho), scaled.p_rate(model.rho)) else { return false };
+            let gain = schedule.gain_matrix(model.rho);
+            let auxiliary = if is_high_gain { scaled.unsaturated_gain(model.rho) } else { None };
+            let unsaturated = auxiliary.as_ref().unwrap_or(&gain);
+            saturation.is_none_or(|saturation| stays_unsaturated(&p, unsaturated, saturation))
+                && mixtures_hold(model, weights, &p, &gain, auxiliary.as_ref(), Some(&p_rate))
+        })
+    };
+    let factor = FACTORS.into_iter().filter(|&factor| factor <= 1e-3).find(suffices)?;
+    lyapunov.back_off(1.0 + factor);
+    Some(factor)
 }
 
 /// Whether kᵢP⁻¹kᵢᵀ < σᵢ²/γ for every row (Lemma 2.2).

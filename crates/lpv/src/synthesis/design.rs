@@ -1,7 +1,8 @@
 //! The design: what synthesis gives back, and the map over the parameter grid that makes it.
 
 use super::back_off::{Saturation, back_off};
-use super::{HighGainOptions, SynthesisError, high_gain, lpvqr, slpvqr};
+use super::moving;
+use super::{HighGainOptions, RateBounded, RateBoundedOptions, SynthesisError, high_gain, lpvqr, slpvqr};
 use crate::controller::{Controller, InputLimits, Schedule};
 use crate::math::Mat;
 use crate::math::matrix::{rows, rows_option};
@@ -107,8 +108,12 @@ pub struct Design {
     pub schedule_error: f64,
     /// ε: every P is (1 + ε) times the optimal one, so that the inequalities hold strictly with the gain that flies.
     pub back_off: f64,
-    /// The frozen designs, in ascending order of the parameter.
+    /// The designs at the grid points, in ascending order of the parameter.
     pub points: Vec<FrozenDesign>,
+    /// The Lyapunov function between the grid points and the rate it is for, of a design for a moving parameter; of a
+    /// frozen design nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_bounded: Option<RateBounded>,
 }
 
 /// What a design is asked for.
@@ -128,6 +133,8 @@ pub struct DesignRequest {
     pub limits: InputLimits,
     /// Time between two samples of the controller.
     pub sample_time_s: f64,
+    /// Design for a parameter that moves; `None` is frozen design at each grid point.
+    pub rate_bounded: Option<RateBoundedOptions>,
 }
 
 /// Design over the whole grid, in parallel. `progress` is called with the number of finished points; it may be called
@@ -148,6 +155,10 @@ pub fn design(
     let done = AtomicUsize::new(0);
     let count = |_: &_| progress(done.fetch_add(1, Ordering::Relaxed) + 1);
 
+    if let (Some(options), Some(_)) = (&request.rate_bounded, &model.scheduling) {
+        let sigma = request.method.gamma().map(|_| sigma()).transpose()?;
+        return moving::design(spec, plant, request, options, &model, sigma.as_deref(), progress);
+    }
     let mut points: Vec<FrozenDesign> = match request.method {
         Method::Lpvqr => map_grid(&model, |point| lpvqr::frozen(point, weights).inspect(count))?,
         Method::Slpvqr { gamma } => {
@@ -173,14 +184,34 @@ pub fn design(
     let bounds = request.method.gamma().map(|gamma| sigma().map(|sigma| (sigma, gamma))).transpose()?;
     let saturation = bounds.as_ref().map(|(sigma, gamma)| Saturation { sigma, gamma: *gamma });
     let back_off = back_off(&mut points, &model.points, weights, &schedule, saturation.as_ref());
+    Ok(assemble(spec, request, &model, operating_input, Parts { schedule, points, back_off, rate_bounded: None }))
+}
+
+/// What is left to a design once its gains are found.
+pub(super) struct Parts {
+    pub schedule: Schedule,
+    pub points: Vec<FrozenDesign>,
+    pub back_off: f64,
+    pub rate_bounded: Option<RateBounded>,
+}
+
+/// The design of `request` with these `parts`.
+pub(super) fn assemble(
+    spec: &PlantSpec,
+    request: &DesignRequest,
+    model: &GridModel,
+    operating_input: Vec<f64>,
+    parts: Parts,
+) -> Design {
+    let Parts { schedule, points, back_off, rate_bounded } = parts;
     let schedule_error =
         (points.iter()).map(|point| (schedule.gain_matrix(point.rho) - &point.gain).norm_max()).fold(0.0, f64::max);
-    Ok(Design {
+    Design {
         name: request.name.clone(),
         convention: "u = u* - sat(K(rho) (x - x_ref))".into(),
         plant: spec.clone(),
         method: request.method,
-        weights: weights.clone(),
+        weights: request.weights.clone(),
         sample_time_s: request.sample_time_s,
         controller: Controller {
             schedule,
@@ -191,7 +222,8 @@ pub fn design(
         schedule_error,
         back_off,
         points,
-    })
+        rate_bounded,
+    }
 }
 
 /// σ of every input, or which input has none.
@@ -215,7 +247,7 @@ fn map_grid<T: Send>(
     results.into_iter().collect()
 }
 
-fn schedule(model: &GridModel, points: &[FrozenDesign], kind: ScheduleKind) -> Schedule {
+pub(super) fn schedule(model: &GridModel, points: &[FrozenDesign], kind: ScheduleKind) -> Schedule {
     let Some(scheduling) = model.scheduling.as_ref().filter(|_| points.len() > 1) else {
         return Schedule::Constant { gain: points[0].gain.clone() };
     };

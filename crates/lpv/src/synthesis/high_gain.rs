@@ -25,7 +25,7 @@
 use super::back_off::mixtures_hold;
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
 use super::slpvqr::not_definite;
-use super::{CostWeights, FrozenDesign, SynthesisError};
+use super::{CostWeights, FrozenDesign, RateBounded, SynthesisError};
 use crate::math::eigen::spectral_radius;
 use crate::math::hold::discretize;
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
@@ -54,6 +54,8 @@ impl Default for HighGainOptions {
 pub(super) struct Segment {
     rho: f64,
     p: Mat<f64>,
+    /// Ṗ at the largest rate, where the parameter may move.
+    p_rate: Option<Mat<f64>>,
     /// F = K_0
     low: Mat<f64>,
     /// R⁻¹BᵀP = K_1
@@ -101,11 +103,33 @@ pub(super) fn segment(
         high: &inverse.r * model.b.transpose() * &p,
         trace_y: trace(&y),
         p,
+        p_rate: None,
         iterations: answer.iterations.len(),
     })
 }
 
 impl Segment {
+    /// The segment of a design for a moving parameter at one value of it. The derivation of the module holds as it stands:
+    /// Ṗ is a constant in each inequality.
+    pub(super) fn moving(
+        model: &FrozenModel,
+        weights: &CostWeights,
+        lyapunov: &RateBounded,
+        iterations: usize,
+    ) -> Option<Self> {
+        let (p, low) = (lyapunov.p(model.rho)?, lyapunov.unsaturated_gain(model.rho)?);
+        let inverse = InverseWeights::new(weights);
+        Some(Self {
+            rho: model.rho,
+            low,
+            high: &inverse.r * model.b.transpose() * &p,
+            trace_y: trace(&lyapunov.y.at(&[model.rho])),
+            p_rate: lyapunov.p_rate(model.rho),
+            p,
+            iterations,
+        })
+    }
+
     /// K_s
     fn gain(&self, s: f64) -> Mat<f64> {
         Mat::from_fn(self.low.nrows(), self.low.ncols(), |i, j| (1.0 - s) * self.low[(i, j)] + s * self.high[(i, j)])
@@ -153,7 +177,7 @@ impl Segment {
     pub(super) fn into_design(self, model: &FrozenModel, weights: &CostWeights, mut s: f64) -> FrozenDesign {
         // s = 0 satisfies the inequalities, so halving ends; 2⁻⁶⁰ of a gain is rounding
         for _ in 0..60 {
-            if mixtures_hold(model, weights, &self.p, &self.gain(s), Some(&self.low)) {
+            if mixtures_hold(model, weights, &self.p, &self.gain(s), Some(&self.low), self.p_rate.as_ref()) {
                 break;
             }
             s *= 0.5;

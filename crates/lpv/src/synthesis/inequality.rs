@@ -30,9 +30,21 @@ impl InverseWeights {
 ///
 /// Equivalent to V̇ < −xᵀQx − uᵀRu for V = xᵀY⁻¹x under u = −LY⁻¹x.
 pub(super) fn performance(y: &Expr, l: &Expr, model: &FrozenModel, inverse: &InverseWeights) -> Expr {
+    performance_with_rate(y, l, &Expr::zeros(y.nrows(), y.nrows()), model, inverse)
+}
+
+/// [`performance`] for a Y that moves: its first block is −(AY − BL) − (AY − BL)ᵀ + Ẏ (4.32), and V̇ is along the moving
+/// parameter too.
+pub(super) fn performance_with_rate(
+    y: &Expr,
+    l: &Expr,
+    y_rate: &Expr,
+    model: &FrozenModel,
+    inverse: &InverseWeights,
+) -> Expr {
     let flow = &model.a * y - &model.b * l;
     Expr::symmetric_blocks(vec![
-        vec![-(&flow + flow.t())],
+        vec![y_rate - (&flow + flow.t())],
         vec![y.clone(), Expr::constant(inverse.q.clone())],
         vec![l.clone(), Expr::zeros(l.nrows(), y.ncols()), Expr::constant(inverse.r.clone())],
     ])

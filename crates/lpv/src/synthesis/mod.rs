@@ -6,8 +6,10 @@
 //! | `slpvqr` | the same under input saturation, low gain | Theorems 5.1, 5.3 |
 //! | `high_gain` | the same under input saturation, high gain | Theorems 5.2, 5.4 |
 //!
-//! All three are *frozen-parameter* designs: each grid point is solved as if the parameter stood still there. Their
-//! bounds hold for a parameter at rest; for a moving one nothing is claimed here.
+//! By themselves all three are *frozen-parameter* designs: each grid point is solved as if the parameter stood still there.
+//! Their bounds hold for a parameter at rest; for a moving one nothing is claimed here. With a rate bound
+//! (`rate_bounded`, [`RateBoundedOptions`]) one Lyapunov matrix Y(ρ), smooth in the parameter, serves the whole range, and
+//! the bounds are for every motion within that rate.
 //!
 //! To add a method: one file with its inequalities, one variant in [`Method`].
 
@@ -16,6 +18,8 @@ mod design;
 mod high_gain;
 mod inequality;
 mod lpvqr;
+mod moving;
+mod rate_bounded;
 mod region;
 mod slpvqr;
 mod validation;
@@ -23,6 +27,7 @@ mod validation;
 pub use design::{CostWeights, Design, DesignRequest, FrozenDesign, Method, ScheduleKind, design};
 pub use high_gain::HighGainOptions;
 pub use lpvqr::lqr_by_inequality;
+pub use rate_bounded::{RateBounded, RateBoundedOptions};
 pub use region::covering_level;
 pub use validation::DesignError;
 
@@ -69,6 +74,14 @@ pub enum SynthesisError {
     UnlimitedInput {
         /// Index of the input.
         input: usize,
+    },
+    /// The inequalities hold on the grid of a rate-bounded design, but not between its points.
+    #[error(
+        "with {points} grid points the inequalities of the rate-bounded design still fail between them; try a higher order of its Lyapunov matrix, more grid_points, or a smaller rate"
+    )]
+    BetweenGridPoints {
+        /// Points of the grid.
+        points: usize,
     },
     /// No gain on the high-gain segment is stable at the controller's sample time.
     #[error("no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster")]

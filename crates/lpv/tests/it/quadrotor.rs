@@ -35,6 +35,7 @@ pub fn designed(method: Method, limits: InputLimits, grid_points: usize, schedul
         schedule,
         limits,
         sample_time_s: 0.002,
+        rate_bounded: None,
     };
     design(&spec(9.807), &*plant(), &request, &|_| {}).unwrap()
 }

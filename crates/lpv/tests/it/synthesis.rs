@@ -43,6 +43,7 @@ fn lpvqr_gain_is_the_thesis_one_at_every_yaw() {
             schedule,
             limits: InputLimits::none(4),
             sample_time_s: 0.002,
+            rate_bounded: None,
         };
         let design = design(&plant_spec, &*plant, &request, &|_| {}).unwrap();
         for k in 0..50 {
@@ -180,6 +181,7 @@ fn double_integrator_bounds() {
         schedule: ScheduleKind::Grid,
         limits,
         sample_time_s: 0.001,
+        rate_bounded: None,
     };
     let spec = PlantSpec::DoubleIntegrator {};
     let plant = spec.build().unwrap();
@@ -219,6 +221,7 @@ fn failures_name_their_cause() {
         schedule: ScheduleKind::Grid,
         limits,
         sample_time_s: 0.002,
+        rate_bounded: None,
     };
     let mut one_free = limits();
     (one_free.min[2], one_free.max[2]) = (None, None);

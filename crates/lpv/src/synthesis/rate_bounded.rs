@@ -1,0 +1,163 @@
+//! Designs for a parameter that moves: Lyapunov matrix Y(ρ) = Σ fᵢ(ρ) Yᵢ with basis functions fᵢ, and a bound on the rate.
+//!
+//! After F. Wu, X. H. Yang, A. Packard and G. Becker, "Induced L2-norm control for LPV systems with bounded parameter
+//! variation rates", International Journal of Robust and Nonlinear Control 6 (1996), with the cost bound of Theorem 4.4
+//! in place of the L2 gain and the input constraint of Theorem 5.3. For V = xᵀY(ρ)⁻¹x and u = −L(ρ)Y(ρ)⁻¹x
+//!
+//! ```text
+//! V̇ = −xᵀY⁻¹ [ −(AY − BL) − (AY − BL)ᵀ + Ẏ ] Y⁻¹x,    Ẏ = Σ_p ρ̇_p ∂Y/∂ρ_p,
+//! ```
+//!
+//! so the inequality of Theorem 4.5 with Ẏ added to its first block, at every ρ and both ends of the rate interval (Ẏ is
+//! affine in ρ̇), makes xᵀY(ρ)⁻¹x a bound on the cost of every flight with |ρ̇| ≤ r. The inequalities are imposed on a
+//! grid; what lies between its points is for the certificate to prove.
+
+use super::inequality::{InverseWeights, performance_with_rate, solve, unsaturated};
+use super::{CostWeights, SynthesisError};
+use crate::math::Mat;
+use crate::math::matrix::{inverse_spd, symmetric_part};
+use crate::math::scalar::{derivative, dual};
+use crate::model::{BasisFunction, FrozenModel, MatrixFunction};
+use lmi::{Expr, Problem};
+use serde::{Deserialize, Serialize};
+
+/// How a design for a moving parameter is made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RateBoundedOptions {
+    /// r > 0: the parameter's rate is anywhere in [−r, r], its unit per second.
+    pub rate: f64,
+    /// Y(ρ) is a trigonometric polynomial (periodic parameter) or polynomial of this order; at least 1.
+    pub order: u32,
+    /// An error x whose bound xᵀP(ρ)x is to be least over all ρ, so that the certified set reaches farthest along it;
+    /// without it Σ tr Y(ρ_k) is to be largest.
+    pub direction: Option<Vec<f64>>,
+}
+
+/// The Lyapunov function xᵀY(ρ)⁻¹x of a design for a moving parameter.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RateBounded {
+    /// r: what is claimed is claimed for parameter rates in [−r, r].
+    pub rate: f64,
+    /// Y(ρ) ≻ 0, for every ρ; P(ρ) = Y(ρ)⁻¹.
+    pub y: MatrixFunction,
+    /// L(ρ) = F(ρ)Y(ρ) with the gain F that is unsaturated on the certified set; only of the saturated methods.
+    #[serde(default)]
+    pub l: Option<MatrixFunction>,
+}
+
+impl RateBounded {
+    /// P(ρ) = Y(ρ)⁻¹; `None` where Y is not positive definite.
+    pub fn p(&self, rho: f64) -> Option<Mat<f64>> {
+        inverse_spd(&self.y.at(&[rho]))
+    }
+
+    /// r ∂P/∂ρ = −r P Y′ P: the rate of P when the parameter moves at r.
+    pub fn p_rate(&self, rho: f64) -> Option<Mat<f64>> {
+        let p = self.p(rho)?;
+        let flow = &p * self.y.derivative(&[rho], 0) * &p;
+        Some(Mat::from_fn(p.nrows(), p.ncols(), |i, j| -self.rate * flow[(i, j)]))
+    }
+
+    /// F(ρ) = L(ρ)Y(ρ)⁻¹, of the saturated methods.
+    pub fn unsaturated_gain(&self, rho: f64) -> Option<Mat<f64>> {
+        Some(self.l.as_ref()?.at(&[rho]) * self.p(rho)?)
+    }
+
+    /// Y and L divided by `factor`: P is multiplied by it, F stays.
+    pub(super) fn back_off(&mut self, factor: f64) {
+        for coefficient in
+            self.y.coefficients.iter_mut().chain(self.l.iter_mut().flat_map(|l| l.coefficients.iter_mut()))
+        {
+            *coefficient = Mat::from_fn(coefficient.nrows(), coefficient.ncols(), |i, j| coefficient[(i, j)] / factor);
+        }
+    }
+}
+
+/// Basis functions of order `order` for a parameter that is periodic with 2π, or not.
+pub(super) fn basis(periodic: bool, order: u32) -> Vec<BasisFunction> {
+    if periodic { BasisFunction::harmonics(0, order) } else { BasisFunction::powers(0, order) }
+}
+
+/// The inequalities on the grid of linearisations `grid`, for Y with `basis`; L has the basis functions too.
+///
+/// With input bounds (σ, γ) the unknowns are Y and L, and kᵢx is bounded as in Theorem 5.3. Without them L = R⁻¹Bᵀ is
+/// optimal and eliminated (Corollary 4.1): the performance inequality is then −(AY + YAᵀ) + BR⁻¹Bᵀ + Ẏ bordered by Y and Q⁻¹.
+///
+/// Returns the Lyapunov function and the number of interior-point iterations.
+///
+/// # Errors
+/// Infeasible, unbounded or inaccurate.
+pub(super) fn solve_on_grid(
+    grid: &[FrozenModel],
+    options: &RateBoundedOptions,
+    basis: &[BasisFunction],
+    weights: &CostWeights,
+    saturation: Option<(&[f64], f64)>,
+) -> Result<(RateBounded, usize), SynthesisError> {
+    let (n, m) = (grid[0].a.nrows(), grid[0].b.ncols());
+    let inverse = InverseWeights::new(weights);
+    let mut problem = Problem::new();
+    let y_unknowns: Vec<Expr> = (0..basis.len()).map(|i| problem.symmetric(format!("Y{i}"), n)).collect();
+    let l_unknowns: Vec<Expr> = match saturation {
+        Some(_) => (0..basis.len()).map(|i| problem.rectangular(format!("L{i}"), m, n)).collect(),
+        None => Vec::new(),
+    };
+    let bound = options.direction.as_ref().map(|direction| (direction, problem.scalar("t")));
+
+    let mut trace = Expr::zeros(1, 1);
+    for model in grid {
+        let rho = model.rho;
+        let y = combination(basis, &y_unknowns, |function| function.at(&[rho]));
+        let slope = combination(basis, &y_unknowns, |function| derivative(&function.at(&[dual(rho, Some(0))]), 0));
+        let l = saturation.map(|_| combination(basis, &l_unknowns, |function| function.at(&[rho])));
+        for rate in [-options.rate, options.rate] {
+            let y_rate = rate * &slope;
+            let inequality = match &l {
+                Some(l) => performance_with_rate(&y, l, &y_rate, model, &inverse),
+                None => {
+                    let flow = &model.a * &y;
+                    let control = &model.b * &inverse.r * model.b.transpose();
+                    Expr::symmetric_blocks(vec![
+                        vec![y_rate - (&flow + flow.t()) + Expr::constant(control)],
+                        vec![y.clone(), Expr::constant(inverse.q.clone())],
+                    ])
+                }
+            };
+            problem.positive_definite(format!("performance at {rho:.4}, rate {rate:+}"), inequality);
+        }
+        if let (Some(l), Some((sigma, gamma))) = (&l, saturation) {
+            for (i, &bound) in sigma.iter().enumerate() {
+                let name = format!("input {} unsaturated at {rho:.4}", i + 1);
+                problem.positive_definite(name, unsaturated(&y, l.row(i), bound, gamma));
+            }
+        }
+        if let Some((direction, t)) = &bound {
+            let column = Expr::constant(Mat::from_fn(n, 1, |i, _| direction[i]));
+            let blocks = vec![vec![t.clone()], vec![column, y.clone()]];
+            problem.positive_definite(format!("bound of the direction at {rho:.4}"), Expr::symmetric_blocks(blocks));
+        }
+        trace = trace + y.trace();
+    }
+    match &bound {
+        Some((_, t)) => problem.minimize(t),
+        None => problem.maximize(&trace),
+    }
+    let answer = solve(&problem, grid[0].rho)?;
+    let function = |coefficients| MatrixFunction { basis: basis.to_vec(), coefficients };
+    let y = function(y_unknowns.iter().map(|y| symmetric_part(&answer.value(y))).collect());
+    let l = saturation.map(|_| function(l_unknowns.iter().map(|l| answer.value(l)).collect()));
+    Ok((RateBounded { rate: options.rate, y, l }, answer.iterations.len()))
+}
+
+/// Σ fᵢ Xᵢ with numbers fᵢ made from the basis functions. What is zero up to rounding, such as sin π, is zero: a solver
+/// that scales its unknowns would otherwise take it for a number.
+fn combination(basis: &[BasisFunction], unknowns: &[Expr], factor: impl Fn(&BasisFunction) -> f64) -> Expr {
+    let factors: Vec<f64> = basis.iter().map(factor).collect();
+    let largest = factors.iter().fold(0.0_f64, |largest, factor| largest.max(factor.abs()));
+    let (rows, columns) = (unknowns[0].nrows(), unknowns[0].ncols());
+    factors
+        .into_iter()
+        .zip(unknowns)
+        .filter(|(factor, _)| factor.abs() > 1e-12 * largest)
+        .fold(Expr::zeros(rows, columns), |sum, (factor, unknown)| sum + factor * unknown)
+}
