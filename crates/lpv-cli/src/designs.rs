@@ -101,7 +101,7 @@ pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
 
 fn same_but_name(a: &DesignRequest, b: &DesignRequest) -> bool {
     // all requests of a scenario share plant, weights, grid and sample time
-    a.method == b.method && a.schedule == b.schedule && a.limits == b.limits
+    a.method == b.method && a.schedule == b.schedule && a.limits == b.limits && a.rate_bounded == b.rate_bounded
 }
 
 fn design_one(scenario: &Scenario, request: &DesignRequest) -> Result<CheckedDesign, SynthesisError> {

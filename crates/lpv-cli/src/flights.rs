@@ -95,9 +95,11 @@ fn step_bounds(
             UnmetCondition::Outside { .. } => None,
             UnmetCondition::ParameterMoves { rate } => {
                 let (parameter, unit) = scheduling.map_or(("", ""), |s| (s.parameter.as_str(), s.unit.as_str()));
-                Some(format!(
-                    "; {parameter} moves at up to {rate:.2e} {unit}/s, and the bound is for a parameter at rest"
-                ))
+                let allowed = match &design.rate_bounded {
+                    None => "a parameter at rest".to_owned(),
+                    Some(bounded) => format!("rates up to {} {unit}/s", bounded.rate),
+                };
+                Some(format!("; {parameter} moves at up to {rate:.2e} {unit}/s, and the bound is for {allowed}"))
             }
             UnmetCondition::Noise => Some("; noise acts, of which the bound knows nothing".into()),
         });

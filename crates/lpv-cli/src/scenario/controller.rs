@@ -2,14 +2,18 @@
 
 use super::door::Door;
 use super::file::{Bound, ControllerTable, LimitsTable, MethodName};
+use super::set_point::state_value;
 use super::{ControllerPlan, file_name_part};
 use crate::failure::Failure;
 use lpv::controller::InputLimits;
 use lpv::plant::Description;
-use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method};
+use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method, RateBoundedOptions};
 
 /// Inputs that the high-gain method is meant for: it poses 2^m inequalities.
 const MOST_HIGH_GAIN_INPUTS: usize = 10;
+/// Order of Y(ρ) of a design for a moving parameter: where the file says none, and at most.
+const LYAPUNOV_ORDER: u32 = 2;
+const MOST_LYAPUNOV_ORDER: u32 = 8;
 
 /// What every controller of a scenario shares.
 pub(super) struct RequestDefaults<'a> {
@@ -33,7 +37,7 @@ pub(super) fn controller(
     if table.unlimited && table.limits.is_some() {
         return door.refuse(format!("{key}.unlimited"), "contradicts the limits of this controller; keep one");
     }
-    let label = table.label.unwrap_or_else(|| table.name.clone());
+    let label = table.label.clone().unwrap_or_else(|| table.name.clone());
     if label.chars().any(char::is_control) {
         return door.refuse(
             format!("{key}.label"),
@@ -89,6 +93,7 @@ pub(super) fn controller(
             );
         }
     }
+    let rate_bounded = rate_bounded(door, key, &table, defaults)?;
     let inputs = defaults.operating_input.len();
     if matches!(method, Method::HighGainSlpvqr { .. }) && inputs > MOST_HIGH_GAIN_INPUTS {
         return door.refuse(
@@ -112,12 +117,72 @@ pub(super) fn controller(
             schedule: table.schedule,
             limits,
             sample_time_s: defaults.sample_time_s,
-            rate_bounded: None,
+            rate_bounded,
         },
         noise: table.noise,
         estimator: table.estimator.is_some(),
         require: table.require,
     })
+}
+
+/// The keys of a design for a moving parameter.
+fn rate_bounded(
+    door: &Door,
+    key: &str,
+    table: &ControllerTable,
+    defaults: &RequestDefaults,
+) -> Result<Option<RateBoundedOptions>, Failure> {
+    let Some(rate) = table.rate_bound else {
+        return match (table.lyapunov_order, &table.region) {
+            (None, None) => Ok(None),
+            (Some(_), _) => door.refuse(format!("{key}.lyapunov_order"), "belongs to a design with rate_bound only"),
+            (_, Some(_)) => door.refuse(format!("{key}.region"), "belongs to a design with rate_bound only"),
+        };
+    };
+    let Some(scheduling) = &defaults.description.scheduling else {
+        return door
+            .refuse(format!("{key}.rate_bound"), "the plant has no scheduling parameter that could move; remove it");
+    };
+    if !(rate >= 0.0 && rate.is_finite()) {
+        return door.refuse(
+            format!("{key}.rate_bound"),
+            format!(
+                "is {rate}: it has to be the largest rate of {}, zero or more, in {}/s",
+                scheduling.parameter, scheduling.unit
+            ),
+        );
+    }
+    let order = table.lyapunov_order.unwrap_or(LYAPUNOV_ORDER);
+    if !(1..=MOST_LYAPUNOV_ORDER).contains(&order) {
+        return door.refuse(
+            format!("{key}.lyapunov_order"),
+            format!("is {order}: allowed are 1 to {MOST_LYAPUNOV_ORDER}, the highest harmonic (or power) of the parameter in Y"),
+        );
+    }
+    let direction = match &table.region {
+        None => None,
+        Some(region) => Some(direction(door, &format!("{key}.region"), region, defaults.description)?),
+    };
+    Ok(Some(RateBoundedOptions { rate, order, direction }))
+}
+
+/// A direction in state space, by the names of states.
+fn direction(door: &Door, key: &str, table: &toml::Table, description: &Description) -> Result<Vec<f64>, Failure> {
+    let mut direction = vec![0.0; description.states.len()];
+    for (name, value) in table {
+        let (state, value) = state_value(door, &format!("{key}.{name}"), description, name, value)?;
+        direction[state] = value;
+    }
+    match direction.iter().any(|&value| value != 0.0) {
+        true => Ok(direction),
+        false => {
+            let example = &description.states[0].name;
+            door.refuse(
+                key,
+                format!("is no direction: give an error that the set has to hold, such as {{ {example} = 1.0 }}"),
+            )
+        }
+    }
 }
 
 fn check_high_gain(door: &Door, key: &str, options: &HighGainOptions) -> Result<(), Failure> {

@@ -121,6 +121,9 @@ pub struct ControllerTable {
     pub method: MethodName,
     pub gamma: Option<f64>,
     pub high_gain: Option<HighGainOptions>,
+    pub rate_bound: Option<f64>,
+    pub lyapunov_order: Option<u32>,
+    pub region: Option<toml::Table>,
     #[serde(default)]
     pub schedule: ScheduleKind,
     pub limits: Option<LimitsTable>,

@@ -276,6 +276,9 @@ fn controllers() {
             "method = \"high-gain-slpvqr\"\ngamma = 2\nhigh_gain = { gain_margin = 0.5 }",
             &["controller[2].high_gain.gain_margin", "at least 1"],
         ),
+        (LPVQR, "method = \"lpvqr\"\nrate_bound = 1", &["controller[1].rate_bound", "no scheduling parameter"]),
+        (LPVQR, "method = \"lpvqr\"\nregion = { x_1 = 1 }", &["controller[1].region", "rate_bound only"]),
+        (LPVQR, "method = \"lpvqr\"\nlyapunov_order = 2", &["controller[1].lyapunov_order", "rate_bound only"]),
         (LPVQR, "method = \"lpvqr\"\nestimator = \"ekf\"", &["controller[1].estimator", "noise = true"]),
         ("name = \"saturated\"", "name = \"regulator\"", &["controller[2].name", "already taken"]),
         ("name = \"saturated\"", "name = \"Regulator\"", &["controller[2].name", "already taken"]),
@@ -292,6 +295,22 @@ fn controllers() {
     refused(none, 2, &["scenario.toml", "controller", "at least one [[controller]]"]);
     let quiet = edited(DOUBLE_INTEGRATOR, "[noise]\nprocess_diag = [1e-6]\nmeasurement_diag = [1e-4]\n", "");
     refused(quiet, 2, &["scenario.toml", "controller[4].noise", "no [noise] table"]);
+}
+
+#[test]
+fn designs_for_a_moving_parameter() {
+    let method = "method = \"lpvqr\"\nschedule = \"vertices\"";
+    for (keys, words) in [
+        ("rate_bound = -1", ["controller[1].rate_bound", "zero or more"]),
+        ("rate_bound = inf", ["controller[1].rate_bound", "psi"]),
+        ("rate_bound = 1\nlyapunov_order = 0", ["controller[1].lyapunov_order", "1 to 8"]),
+        ("rate_bound = 1\nlyapunov_order = 9", ["controller[1].lyapunov_order", "1 to 8"]),
+        ("rate_bound = 1\nregion = { r_q = 1 }", ["controller[1].region.r_q", "not a state"]),
+        ("rate_bound = 1\nregion = { r_x = 0 }", ["controller[1].region", "no direction"]),
+        ("rate_bound = 1\nregion = {}", ["controller[1].region", "no direction"]),
+    ] {
+        refused(edited(QUADROTOR, method, &format!("{method}\n{keys}")), 2, &[words[0], words[1], "scenario.toml"]);
+    }
 }
 
 /// 2^m inequalities of a plant with many inputs would fill any memory.

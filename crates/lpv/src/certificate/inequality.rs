@@ -22,7 +22,8 @@ pub struct BlockMargin {
 /// λ_min of every block of the inequalities of a design at every grid point: (4.36) for LPVQR; (5.18), (5.19) for SLPVQR;
 /// (5.20) for all 2^m mixtures and (5.21) for high gain.
 ///
-/// The blocks are in Y = P⁻¹ and L = KY, as printed, with the K that flies: the schedule's, not the point's.
+/// The blocks are in Y = P⁻¹ and L = KY, as printed, with the K that flies: the schedule's, not the point's. A design for
+/// a moving parameter has ±Ẏ in its first block, at both ends of its rate interval.
 pub fn block_margins(design: &Design, plant: &dyn Plant) -> Vec<BlockMargin> {
     let margins = |point: &FrozenDesign| point_margins(design, point, &linearize(plant, point.rho));
     design.points.iter().flat_map(margins).collect()
@@ -38,10 +39,19 @@ fn point_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> 
         margins.push(block("P, Q, R invertible".into(), f64::NAN));
         return margins;
     };
-    let performance = |gain: &Mat<f64>| performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
+    let y_rate = (design.rate_bounded.as_ref()).map(|bounded| bounded.rate * bounded.y.derivative(&[point.rho], 0));
+    // the worse of both ends of the rate interval
+    let performance = |gain: &Mat<f64>| {
+        let block = performance_block(model, &y, &(gain * &y), &q_inverse, &r_inverse);
+        match &y_rate {
+            None => smallest_eigenvalue(&block),
+            Some(rate) => smallest_eigenvalue(&with_rate(&block, rate, 1.0))
+                .min(smallest_eigenvalue(&with_rate(&block, rate, -1.0))),
+        }
+    };
 
     match &point.auxiliary_gain {
-        None => margins.push(block("performance".into(), smallest_eigenvalue(&performance(&gain)))),
+        None => margins.push(block("performance".into(), performance(&gain))),
         Some(auxiliary) => {
             let inputs = gain.nrows();
             margins.extend((0..1usize << inputs).map(|vertex| {
@@ -49,7 +59,7 @@ fn point_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> 
                     if vertex >> i & 1 == 1 { gain[(i, j)] } else { auxiliary[(i, j)] }
                 });
                 let name = format!("performance of mixture {vertex:0inputs$b}");
-                block(name, smallest_eigenvalue(&performance(&mixture)))
+                block(name, performance(&mixture))
             }));
         }
     }
@@ -86,6 +96,14 @@ fn performance_block(
         (_, 0) => l[(i - 2 * n, j)],
         (1, _) | (_, 1) => 0.0,
         _ => r_inverse[(i - 2 * n, j - 2 * n)],
+    })
+}
+
+/// `block` with `sign` · Ẏ added to its first block (4.32).
+fn with_rate(block: &Mat<f64>, y_rate: &Mat<f64>, sign: f64) -> Mat<f64> {
+    let n = y_rate.nrows();
+    Mat::from_fn(block.nrows(), block.ncols(), |i, j| {
+        if i < n && j < n { block[(i, j)] + sign * y_rate[(i, j)] } else { block[(i, j)] }
     })
 }
 

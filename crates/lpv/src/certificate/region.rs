@@ -74,7 +74,13 @@ pub fn step_bound(design: &Design, scheduling: Option<&Scheduling>, step: &StepC
     let p = lyapunov_matrix(design, scheduling, step.parameter);
     let level = design.method.gamma().or_else(|| {
         let sigma = design.controller.limits.symmetric_bound(&design.controller.operating_input)?;
-        Some(unsaturated_level(&p, &design.controller.schedule.gain_matrix(step.parameter), &sigma))
+        let schedule = &design.controller.schedule;
+        let at_rest = unsaturated_level(&p, &schedule.gain_matrix(step.parameter), &sigma);
+        // where the parameter may move the state has to stay inside at every value of it
+        let moving = design.points.iter().filter(|_| design.rate_bounded.is_some());
+        Some(moving.fold(at_rest, |level, point| {
+            level.min(unsaturated_level(&point.p, &schedule.gain_matrix(point.rho), &sigma))
+        }))
     });
     let bound = quadratic_form(&p, step.error);
     let outside = level.filter(|&level| bound.is_nan() || bound > level).map(|level| UnmetCondition::Outside { level });

@@ -54,6 +54,16 @@ impl BasisFunction {
         }
     }
 
+    /// p; `None` for the constant.
+    pub fn parameter(&self) -> Option<usize> {
+        match *self {
+            BasisFunction::Constant => None,
+            BasisFunction::Power { parameter, .. }
+            | BasisFunction::Cos { parameter, .. }
+            | BasisFunction::Sin { parameter, .. } => Some(parameter),
+        }
+    }
+
     /// 1, cos ρ, sin ρ, …, cos kρ, sin kρ of parameter `parameter`, for one that is periodic with 2π.
     pub fn harmonics(parameter: usize, order: u32) -> Vec<Self> {
         let pair = |harmonic| [Self::Cos { parameter, harmonic }, Self::Sin { parameter, harmonic }];

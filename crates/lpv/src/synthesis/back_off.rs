@@ -18,6 +18,8 @@ use crate::model::FrozenModel;
 
 /// The ε that are tried, smallest first.
 const FACTORS: [f64; 5] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
+/// The largest ε of a design for a moving parameter: what needs more is met by a finer schedule or a finer grid.
+const LARGEST_MOVING: f64 = 1e-3;
 
 /// Σ of the saturated methods: the bounds σᵢ of the inputs and the level γ.
 pub(super) struct Saturation<'a> {
@@ -79,8 +81,8 @@ pub(super) fn mixtures_hold(
 }
 
 /// [`back_off`] for a parameter that moves, over the linearisations `models` between the grid points too: the least ε for
-/// which everything holds with the scheduled gain at both ends of the rate interval; `None` if none of them up to 10⁻³
-/// does.
+/// which everything holds with the scheduled gain at both ends of the rate interval; `None` if none of
+/// them up to 10⁻³ does.
 pub(super) fn back_off_moving(
     lyapunov: &mut RateBounded,
     models: &[FrozenModel],
@@ -101,7 +103,7 @@ pub(super) fn back_off_moving(
                 && mixtures_hold(model, weights, &p, &gain, auxiliary.as_ref(), Some(&p_rate))
         })
     };
-    let factor = FACTORS.into_iter().filter(|&factor| factor <= 1e-3).find(suffices)?;
+    let factor = FACTORS.into_iter().filter(|&factor| factor <= LARGEST_MOVING).find(suffices)?;
     lyapunov.back_off(1.0 + factor);
     Some(factor)
 }

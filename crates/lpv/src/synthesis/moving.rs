@@ -13,11 +13,14 @@ use rayon::prelude::*;
 
 /// Grid points that the inequalities are imposed on at first, for each basis function; and at most.
 const POINTS_PER_FUNCTION: [usize; 2] = [2, 16];
+/// How much denser than asked for the schedule may become: interpolation of the gain between its points errs with the
+/// fourth power of their distance.
+const SCHEDULE_REFINEMENTS: [usize; 3] = [1, 2, 4];
 /// Points between two grid points of the schedule at which the inequalities are checked before a design is returned.
 const CHECKS_PER_POINT: usize = 4;
 
-/// Impose the inequalities on a grid, check them between its points with the gain as scheduled, and refine the grid until
-/// they hold there too.
+/// Impose the inequalities on a grid, check them between its points with the gain as scheduled, and refine schedule and
+/// grid until they hold there too.
 ///
 /// # Errors
 /// As [`solve_on_grid`]; [`SynthesisError::BetweenGridPoints`] when refinement does not help.
@@ -33,26 +36,29 @@ pub(super) fn design(
     let periodic = model.scheduling.as_ref().is_some_and(|scheduling| scheduling.periodic);
     let basis = basis(periodic, options.order);
     let saturation = sigma.zip(request.method.gamma());
-    let fine = GridModel::of_plant(plant, CHECKS_PER_POINT * model.points.len());
+    let bounds = saturation.map(|(sigma, gamma)| Saturation { sigma, gamma });
+    let is_high_gain = matches!(request.method, Method::HighGainSlpvqr { .. });
     let [mut count, most] = POINTS_PER_FUNCTION.map(|points| points * basis.len());
     loop {
         let coarse = GridModel::of_plant(plant, count);
-        let (mut lyapunov, iterations) = solve_on_grid(&coarse.points, options, &basis, &request.weights, saturation)?;
-        let points = points(request, &model.points, &lyapunov, iterations)?;
-        let schedule = schedule(model, &points, request.schedule);
-        let bounds = saturation.map(|(sigma, gamma)| Saturation { sigma, gamma });
-        let is_high_gain = matches!(request.method, Method::HighGainSlpvqr { .. });
-        let factor =
-            back_off_moving(&mut lyapunov, &fine.points, &request.weights, &schedule, is_high_gain, bounds.as_ref());
-        if let Some(back_off) = factor {
+        let (lyapunov, iterations) = solve_on_grid(&coarse.points, options, &basis, &request.weights, saturation)?;
+        for refinement in SCHEDULE_REFINEMENTS {
+            let scheduled = GridModel::of_plant(plant, refinement * model.points.len());
+            let fine = GridModel::of_plant(plant, CHECKS_PER_POINT * scheduled.points.len());
+            let points = points(request, &scheduled.points, &lyapunov, iterations)?;
+            let schedule = schedule(&scheduled, &points, request.schedule);
+            let mut strict = lyapunov.clone();
+            let factor =
+                back_off_moving(&mut strict, &fine.points, &request.weights, &schedule, is_high_gain, bounds.as_ref());
+            let Some(back_off) = factor else { continue };
             let points = (points.into_iter())
-                .map(|point| Some(FrozenDesign { p: lyapunov.p(point.rho)?, ..point }))
+                .map(|point| Some(FrozenDesign { p: strict.p(point.rho)?, ..point }))
                 .collect::<Option<_>>()
                 .ok_or_else(|| not_definite(model.points[0].rho))?;
             progress(model.points.len());
             let operating_input = plant.trim(model.points[0].rho).input;
-            let parts = Parts { schedule, points, back_off, rate_bounded: Some(lyapunov) };
-            return Ok(assemble(spec, request, model, operating_input, parts));
+            let parts = Parts { schedule, points, back_off, rate_bounded: Some(strict) };
+            return Ok(assemble(spec, request, &scheduled, operating_input, parts));
         }
         if count >= most {
             return Err(SynthesisError::BetweenGridPoints { points: count });

@@ -1,11 +1,11 @@
 //! Do the parts of a design fit together and with its plant? A design may come from a file that was edited, or from another
 //! tool.
 
-use super::{Design, FrozenDesign, Method};
+use super::{Design, FrozenDesign, Method, RateBounded};
 use crate::controller::Schedule;
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, is_finite, is_symmetric};
-use crate::model::{BoxWeights, parameter_grid};
+use crate::model::{BasisFunction, BoxWeights, MatrixFunction, parameter_grid};
 use crate::plant::{Plant, PlantParameterError, Scheduling};
 
 /// Relative difference up to which numbers of a file count as equal: what printing and reading elsewhere may leave.
@@ -74,7 +74,40 @@ impl Design {
                 }
             }
         }
+        if let Some(bounded) = &self.rate_bounded {
+            self.validate_rate_bounded(bounded, scheduling, m, n)?;
+        }
         self.validate_controller(&*plant, m, n)
+    }
+
+    fn validate_rate_bounded(
+        &self,
+        bounded: &RateBounded,
+        scheduling: Option<&Scheduling>,
+        m: usize,
+        n: usize,
+    ) -> Result<(), DesignError> {
+        if scheduling.is_none() {
+            return refuse("rate_bounded", "is there", "absent for a plant without parameter");
+        }
+        if !(bounded.rate >= 0.0 && bounded.rate.is_finite()) {
+            return refuse("rate_bounded.rate", format!("is {}", bounded.rate), "finite, zero or more");
+        }
+        function("rate_bounded.y", &bounded.y, n, n)?;
+        if let Some(l) = &bounded.l {
+            function("rate_bounded.l", l, m, n)?;
+        }
+        if bounded.l.is_some() != self.method.gamma().is_some() {
+            return refuse("rate_bounded.l", "does not fit the method", "there for the saturated methods only");
+        }
+        // the Lyapunov function of the design and the matrices of its points are the same
+        for (k, point) in self.points.iter().enumerate() {
+            let same = bounded.p(point.rho).is_some_and(|p| (&p - &point.p).norm_max() <= 1e-6 * point.p.norm_max());
+            if !same {
+                return refuse(format!("points[{k}].p"), "differs from rate_bounded", "the inverse of its Y there");
+            }
+        }
+        Ok(())
     }
 
     fn validate_controller(&self, plant: &dyn Plant, m: usize, n: usize) -> Result<(), DesignError> {
@@ -173,6 +206,20 @@ fn shape(key: &str, matrix: &Mat<f64>, rows: usize, columns: usize) -> Result<()
         return refuse(key, format!("is {} × {}", matrix.nrows(), matrix.ncols()), format!("{rows} × {columns}"));
     }
     if is_finite(matrix) { Ok(()) } else { refuse(key, "has an entry that is not finite", "finite") }
+}
+
+fn function(key: &str, function: &MatrixFunction, rows: usize, columns: usize) -> Result<(), DesignError> {
+    let (basis, coefficients) = (function.basis.len(), function.coefficients.len());
+    if basis == 0 || basis != coefficients {
+        let found = format!("has {basis} basis functions and {coefficients} coefficients");
+        return refuse(key, found, "one coefficient for each of at least one function");
+    }
+    if let Some(parameter) = function.basis.iter().filter_map(BasisFunction::parameter).find(|&parameter| parameter > 0)
+    {
+        return refuse(format!("{key}.basis"), format!("has parameter {parameter}"), "of parameter 0");
+    }
+    let each = |(i, matrix)| shape(&format!("{key}.coefficients[{i}]"), matrix, rows, columns);
+    function.coefficients.iter().enumerate().try_for_each(each)
 }
 
 fn definite(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(), DesignError> {

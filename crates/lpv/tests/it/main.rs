@@ -4,5 +4,6 @@ mod closed_loop;
 mod filter;
 mod jacobians;
 mod layering;
+mod moving_parameter;
 mod quadrotor;
 mod synthesis;
