@@ -1,26 +1,49 @@
-//! `lpv design`: synthesis and check alone.
+//! `lpv design`: synthesis alone, of a problem file or of the controllers of a scenario.
 
 use crate::designs::{self, DesignSummary};
 use crate::failure::Failure;
-use crate::folder::ResultFolder;
+use crate::folder::{ResultFile, ResultFolder};
 use crate::output::{OutputArguments, print};
+use crate::problem::{ProblemPlan, solve};
 use crate::run::required_verdicts;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, read_text};
 use clap::Args;
 use std::path::PathBuf;
 
 /// Arguments of `lpv design`.
 #[derive(Args)]
 pub struct DesignArguments {
-    /// Scenario file
-    scenario: PathBuf,
+    /// Problem file (with a [design] table), or scenario file
+    file: PathBuf,
     #[command(flatten)]
     output: OutputArguments,
 }
 
-/// Design every controller of the scenario.
+/// Solve the problem, or design every controller of the scenario.
 pub fn run(arguments: &DesignArguments) -> Result<(), Failure> {
-    let scenario = Scenario::read(&arguments.scenario)?;
+    let text = read_text(&arguments.file)?;
+    match ProblemPlan::is_problem(&text) {
+        true => run_problem(arguments, &text),
+        false => run_scenario(arguments),
+    }
+}
+
+/// The answer goes to standard output, and as JSON to the file of `--out`.
+fn run_problem(arguments: &DesignArguments, text: &str) -> Result<(), Failure> {
+    let plan = ProblemPlan::read(&arguments.file, text)?;
+    let place =
+        arguments.output.out.as_deref().map(|place| ResultFile::begin(place, arguments.output.force)).transpose()?;
+    let report = solve(&plan, &arguments.file)?;
+    let json = serde_json::to_string_pretty(&report).map_err(|error| Failure::serialisation(&error))?;
+    if let Some(place) = place {
+        place.finish(json.as_bytes())?;
+    }
+    print(&if arguments.output.json { json } else { report.text() })?;
+    report.failure(&arguments.file).map_or(Ok(()), Err)
+}
+
+fn run_scenario(arguments: &DesignArguments) -> Result<(), Failure> {
+    let scenario = Scenario::read(&arguments.file)?;
     let place = arguments.output.out.clone().unwrap_or_else(|| scenario.designs_folder());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
     let checked = designs::design_all(&scenario)?;

@@ -113,6 +113,47 @@ impl ResultFolder {
     }
 }
 
+/// A result that is one file, whole or not there.
+pub struct ResultFile {
+    place: PathBuf,
+}
+
+impl ResultFile {
+    /// Begin the file that is to stand at `place`.
+    ///
+    /// # Errors
+    /// Something stands there and `replace` is not set, or it is no file, or its folder is not there.
+    pub fn begin(place: &Path, replace: bool) -> Result<Self, Failure> {
+        let refuse = |message: &str| Err(Failure::Output { path: place.to_owned(), message: message.into() });
+        if place.is_dir() || place.file_name().is_none() {
+            return refuse("is a folder; give --out a file name");
+        }
+        if place.exists() && !replace {
+            return refuse("is there already; give --force to replace it, or --out another file");
+        }
+        let folder = place.parent().filter(|parent| !parent.as_os_str().is_empty());
+        if folder.is_some_and(|folder| !folder.is_dir()) {
+            return refuse("cannot be written: its folder is not there; create it, or give --out another file");
+        }
+        Ok(Self { place: place.to_owned() })
+    }
+
+    /// Write it: beside its place first, then moved there.
+    ///
+    /// # Errors
+    /// It cannot be written; what stood there is still there.
+    pub fn finish(self, contents: &[u8]) -> Result<(), Failure> {
+        let name = self.place.file_name().unwrap_or_default().to_string_lossy();
+        let partial = self.place.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+        let written = fs::write(&partial, contents).and_then(|()| fs::rename(&partial, &self.place));
+        written.map_err(|error| {
+            // the failure to write is what there is to report
+            let _ = fs::remove_file(&partial);
+            Failure::io(&self.place, &error)
+        })
+    }
+}
+
 /// Whether a file of this name is one that this program writes.
 fn is_result(name: &str) -> bool {
     let is = |start: &str, end: &str| name.starts_with(start) && name.ends_with(end);

@@ -1,7 +1,7 @@
 //! The program `lpv`: from a nonlinear plant to a checked gain-scheduled controller and its flight.
 //!
 //! Each subcommand is a file; what several share is beside them:
-//! `scenario` reads TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
+//! `scenario` and `problem` read TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
 //! `table` lays them out, `output` prints, `folder` keeps results whole, `failure` is every way to end that is not success.
 
 mod certify;
@@ -11,6 +11,7 @@ mod failure;
 mod flights;
 mod folder;
 mod output;
+mod problem;
 mod progress;
 mod record;
 mod report;
@@ -38,7 +39,7 @@ struct Arguments {
 enum Command {
     /// The whole job: design, check, fly, report
     Run(run::RunArguments),
-    /// Design the controllers of a scenario and check them
+    /// Solve a synthesis problem, or design the controllers of a scenario and check them
     Design(design::DesignArguments),
     /// Check a saved design again, from the plant alone
     Certify(certify::CertifyArguments),

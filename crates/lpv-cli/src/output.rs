@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// Where results go, and in which form they are printed.
 #[derive(Args)]
 pub struct OutputArguments {
-    /// Folder for the results [default: under out/, named after the scenario]
+    /// Folder for the results (file, for a problem) [default: under out/, named after the scenario; none for a problem]
     #[arg(long, short)]
     pub out: Option<PathBuf>,
     /// Replace an earlier result

@@ -2,10 +2,10 @@
 //! file, the key, the value and what is allowed.
 
 mod controller;
-mod door;
-mod file;
+pub(crate) mod door;
+pub(crate) mod file;
 mod set_point;
-mod weights;
+pub(crate) mod weights;
 
 use crate::failure::Failure;
 use controller::{RequestDefaults, controller};

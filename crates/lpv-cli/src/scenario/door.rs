@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use std::path::Path;
 
 /// The file that values are checked for: every refusal names it, the key, and what is allowed.
-pub(super) struct Door<'a> {
+pub(crate) struct Door<'a> {
     pub file: &'a Path,
 }
 

@@ -136,7 +136,7 @@ pub struct ControllerTable {
 }
 
 /// The plant of the `[plant]` table: its `name`, the rest are its parameters.
-pub(super) fn plant(door: &Door, mut table: toml::Table) -> Result<PlantSpec, Failure> {
+pub(crate) fn plant(door: &Door, mut table: toml::Table) -> Result<PlantSpec, Failure> {
     const NAMES: &str = "\"quadrotor\", \"pendulum\", \"double-integrator\", \"linear\"";
     let name = match table.remove("name") {
         Some(toml::Value::String(name)) => name,
@@ -165,7 +165,7 @@ fn parameters<T: DeserializeOwned>(door: &Door, table: toml::Table) -> Result<T,
 }
 
 /// What is wrong with a file that is not the TOML of a scenario, and where: one line.
-pub(super) fn toml_message(text: &str, error: &toml::de::Error) -> String {
+pub(crate) fn toml_message(text: &str, error: &toml::de::Error) -> String {
     /// Characters of the line that are shown.
     const SHOWN: usize = 60;
     let message = engineers_words(error.message());

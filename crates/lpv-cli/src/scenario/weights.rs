@@ -8,7 +8,7 @@ use lpv::math::eigen::smallest_eigenvalue;
 use lpv::math::matrix::{diagonal, from_rows, inverse_spd, is_finite, is_symmetric};
 
 /// A symmetric positive definite matrix from `key` (in full) or `key_diag`.
-pub(super) fn definite(door: &Door, key: &str, rows: Rows, diag: Diagonal, size: usize) -> Result<Mat<f64>, Failure> {
+pub(crate) fn definite(door: &Door, key: &str, rows: Rows, diag: Diagonal, size: usize) -> Result<Mat<f64>, Failure> {
     let (key, matrix) = square(door, key, rows, diag, size)?;
     // by Cholesky: computed eigenvalues are off by a rounding error of the largest
     match inverse_spd(&matrix) {
@@ -25,7 +25,7 @@ pub(super) fn definite(door: &Door, key: &str, rows: Rows, diag: Diagonal, size:
 }
 
 /// A symmetric positive semidefinite matrix from `key` (in full) or `key_diag`.
-pub(super) fn semidefinite(
+pub(crate) fn semidefinite(
     door: &Door,
     key: &str,
     rows: Rows,

@@ -5,10 +5,12 @@
 
 mod basis;
 mod grid;
+mod polytope;
 mod polytopic;
 
 pub use basis::{BasisFunction, MatrixFunction};
 pub use grid::{FrozenModel, GridModel, linearize, parameter_grid};
+pub use polytope::{Polytope, PolytopeError};
 pub use polytopic::{BoxWeights, PolytopicModel};
 
 use crate::plant::{Plant, PlantSpec, Signal};

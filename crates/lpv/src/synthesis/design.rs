@@ -169,7 +169,7 @@ pub fn design(
             let sigma = sigma()?;
             let segments = map_grid(&model, |point| {
                 let segment = high_gain::segment(point, weights, &sigma, gamma)?;
-                let s = segment.choose(point, weights, request.sample_time_s, &options)?;
+                let s = segment.choose(point, weights, Some(request.sample_time_s), &options)?;
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                 Ok((segment, s))
             })?;

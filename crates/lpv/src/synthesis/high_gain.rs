@@ -65,7 +65,7 @@ pub(super) struct Segment {
 }
 
 /// The rows of L where `v` is set and of M elsewhere: S(v, L, M) (5.11).
-fn mixture(vertex: usize, l: &Expr, m: &Expr) -> Expr {
+pub(super) fn mixture(vertex: usize, l: &Expr, m: &Expr) -> Expr {
     let selector = |bit: usize| {
         Mat::from_fn(l.nrows(), l.nrows(), |i, j| if i == j && (vertex >> i & 1) == bit { 1.0 } else { 0.0 })
     };
@@ -109,6 +109,20 @@ pub(super) fn segment(
 }
 
 impl Segment {
+    /// From the unsaturated gain `low` to R⁻¹BᵀP at one model, for choosing s alone.
+    pub(super) fn between(model: &FrozenModel, weights: &CostWeights, p: &Mat<f64>, low: &Mat<f64>) -> Self {
+        let r_inverse = inverse_spd(&weights.r).expect("weights are checked to be positive definite");
+        Self {
+            rho: model.rho,
+            low: low.clone(),
+            high: r_inverse * model.b.transpose() * p,
+            trace_y: f64::NAN,
+            p_rate: None,
+            p: p.clone(),
+            iterations: 0,
+        }
+    }
+
     /// The segment of a design for a moving parameter at one value of it. The derivation of the module holds as it stands:
     /// Ṗ is a constant in each inequality.
     pub(super) fn moving(
@@ -135,19 +149,21 @@ impl Segment {
         Mat::from_fn(self.low.nrows(), self.low.ncols(), |i, j| (1.0 - s) * self.low[(i, j)] + s * self.high[(i, j)])
     }
 
-    /// The s that the rule of the module takes at this point alone.
+    /// The s that the rule of the module takes at this point alone. Without a sample time the controller is continuous, and
+    /// every s is stable.
     pub(super) fn choose(
         &self,
         model: &FrozenModel,
         weights: &CostWeights,
-        sample_time_s: f64,
+        sample_time_s: Option<f64>,
         options: &HighGainOptions,
     ) -> Result<f64, SynthesisError> {
         let regulator = riccati::solve(&model.a, &model.b, &weights.q, &weights.r)
             .map_err(|source| SynthesisError::Riccati { rho: self.rho, source })?;
         let y0 = inverse_spd(&regulator.p).ok_or(SynthesisError::Unbounded { rho: self.rho })?;
-        let (ad, bd) = discretize(&model.a, &model.b, sample_time_s);
+        let sampled = sample_time_s.map(|time| discretize(&model.a, &model.b, time));
         let sampled_is_stable = |k: &Mat<f64>, factor: f64| {
+            let Some((ad, bd)) = &sampled else { return true };
             spectral_radius(&Mat::from_fn(ad.nrows(), ad.ncols(), |i, j| {
                 ad[(i, j)] - factor * (0..k.nrows()).map(|l| bd[(i, l)] * k[(l, j)]).sum::<f64>()
             })) < 1.0
@@ -170,7 +186,7 @@ impl Segment {
             .iter()
             .find(|&&(_, cost)| cost <= (1.0 + options.recovery) * least)
             .map(|&(s, _)| s)
-            .ok_or(SynthesisError::SampleTime { rho: self.rho, sample_time_s })
+            .ok_or(SynthesisError::SampleTime { rho: self.rho, sample_time_s: sample_time_s.unwrap_or(0.0) })
     }
 
     /// The design with gain K_s, or with the largest s/2^k at which every mixture holds (k = 0 for diagonal R).

@@ -6,7 +6,9 @@
 //! | `slpvqr` | the same under input saturation, low gain | Theorems 5.1, 5.3 |
 //! | `high_gain` | the same under input saturation, high gain | Theorems 5.2, 5.4 |
 //!
-//! By themselves all three are *frozen-parameter* designs: each grid point is solved as if the parameter stood still there.
+//! | [`polytopic`] | stabilisation and regulators over a polytope, any model | Theorems 2.1, 4.1-4.4, 5.1-5.4 |
+//!
+//! By themselves the first three are *frozen-parameter* designs: each grid point is solved as if the parameter stood still there.
 //! Their bounds hold for a parameter at rest; for a moving one nothing is claimed here. With a rate bound
 //! (`rate_bounded`, [`RateBoundedOptions`]) one Lyapunov matrix Y(ρ), smooth in the parameter, serves the whole range, and
 //! the bounds are for every motion within that rate.
@@ -19,6 +21,7 @@ mod high_gain;
 mod inequality;
 mod lpvqr;
 mod moving;
+pub mod polytopic;
 mod rate_bounded;
 mod region;
 mod slpvqr;

@@ -105,7 +105,7 @@ fn points(
             let choose = |model: &FrozenModel| {
                 let segment = Segment::moving(model, &request.weights, lyapunov, iterations)
                     .ok_or_else(|| not_definite(model.rho))?;
-                let s = segment.choose(model, &request.weights, request.sample_time_s, &high_gain)?;
+                let s = segment.choose(model, &request.weights, Some(request.sample_time_s), &high_gain)?;
                 Ok((segment, s))
             };
             let chosen: Vec<_> = models.par_iter().map(choose).collect();

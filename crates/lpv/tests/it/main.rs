@@ -5,5 +5,6 @@ mod filter;
 mod jacobians;
 mod layering;
 mod moving_parameter;
+mod polytopic;
 mod quadrotor;
 mod synthesis;

@@ -1,0 +1,307 @@
+//! A problem solved, and its answer as text and for machines.
+
+use super::{ProblemPlan, Scope};
+use crate::failure::Failure;
+use lmi::{Answer, Explanation, InaccurateReason, Outcome, Witness};
+use lpv::certificate::Verdict;
+use lpv::math::Mat;
+use lpv::math::matrix::{quadratic_form, to_rows};
+use lpv::model::{FrozenModel, Polytope};
+use lpv::synthesis::polytopic::{Lyapunov, PolytopicDesign, PolytopicRequest, Solution, frozen, synthesize};
+use serde::Serialize;
+use serde::ser::SerializeMap;
+use std::time::Instant;
+
+type Rows = Vec<Vec<f64>>;
+
+/// What `lpv design PROBLEM.toml --json` prints.
+#[derive(Serialize)]
+pub struct Report {
+    /// solved, infeasible, unbounded or inaccurate; of several points the worst.
+    pub status: &'static str,
+    /// The sign convention of K.
+    convention: &'static str,
+    /// tr Y or Σ tr Yᵢ; the cost bound where that is the objective; the reach along the directions; the margin of stability.
+    objective: Option<f64>,
+    /// What `objective` is.
+    objective_is: &'static str,
+    /// Vertices or grid points, in the order of the matrices.
+    places: Vec<String>,
+    #[serde(rename = "Y")]
+    y: Option<Vec<Rows>>,
+    #[serde(rename = "P")]
+    p: Option<Vec<Rows>>,
+    #[serde(rename = "L")]
+    l: Option<Vec<Rows>>,
+    #[serde(rename = "K")]
+    k: Option<Vec<Rows>>,
+    /// The gain that stays unsaturated, of high-gain designs.
+    #[serde(rename = "F", skip_serializing_if = "Option::is_none")]
+    f: Option<Vec<Rows>>,
+    /// s on K = F + s(R⁻¹BᵀP − F), at each vertex or point.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    s: Option<Vec<f64>>,
+    /// x(0)ᵀP(ρ(0))x(0).
+    guaranteed_cost: Option<f64>,
+    /// Whether x(0) is in the certified set.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    inside_certified_set: Option<bool>,
+    /// Proved lower bound on the smallest eigenvalue of each block.
+    residuals: Margins,
+    iterations: usize,
+    seconds: f64,
+    verdict: Verdict,
+    /// Why the verdict is no better.
+    verdict_reason: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    witness: Option<Vec<NamedMultiplier>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    explanation: Option<Explanation>,
+    /// The place that the status, witness and explanation are of, if it is one of several.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    place: Option<String>,
+}
+
+/// Z of one block of the witness.
+#[derive(Serialize)]
+struct NamedMultiplier {
+    name: String,
+    multiplier: Rows,
+}
+
+/// Verified λ_min by block, a map in the order of the inequalities.
+struct Margins(Vec<(String, f64)>);
+
+impl Serialize for Margins {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, margin) in &self.0 {
+            map.serialize_entry(name, &Some(margin).filter(|margin| margin.is_finite()))?;
+        }
+        map.end()
+    }
+}
+
+/// Solve the problem.
+pub fn solve(plan: &ProblemPlan, path: &std::path::Path) -> Result<Report, Failure> {
+    let request = PolytopicRequest {
+        weights: plan.weights.clone(),
+        lyapunov: match &plan.scope {
+            Scope::Polytope(lyapunov) => lyapunov.clone(),
+            Scope::Frozen => Lyapunov::Common,
+        },
+        saturation: plan.saturation.clone(),
+        high_gain: plan.high_gain,
+        objective: plan.objective.clone(),
+    };
+    let failed = |source| Failure::Synthesis { controller: path.display().to_string(), source };
+    let started = Instant::now();
+    let designs = match &plan.scope {
+        Scope::Polytope(_) => vec![synthesize(&Polytope::hull(&plan.models), &request).map_err(failed)?],
+        Scope::Frozen => frozen(&plan.models, &request).map_err(failed)?,
+    };
+    let guaranteed = guaranteed_cost(plan, &designs, &request).map_err(failed)?;
+    let seconds = started.elapsed().as_secs_f64();
+    Ok(report(plan, &designs, guaranteed, seconds))
+}
+
+/// x(0)ᵀP(ρ(0))x(0); of a frozen design P is of ρ(0) itself.
+fn guaranteed_cost(
+    plan: &ProblemPlan,
+    designs: &[PolytopicDesign],
+    request: &PolytopicRequest,
+) -> Result<Option<f64>, lpv::synthesis::SynthesisError> {
+    let Some(initial) = &plan.initial else { return Ok(None) };
+    let p: Option<Mat<f64>> = match (&plan.scope, &initial.model) {
+        (Scope::Frozen, Some(model)) => {
+            let same = |other: &FrozenModel| other.a == model.a && other.b == model.b;
+            match plan.models.iter().position(same) {
+                Some(at) => designs[at].solution.as_ref().map(|solution| solution.p[0].clone()),
+                None => frozen(std::slice::from_ref(model), request)?[0].solution.as_ref().map(|s| s.p[0].clone()),
+            }
+        }
+        _ => designs[0].solution.as_ref().and_then(|solution| match &initial.parameter {
+            Some(rho) => solution.lyapunov_matrix(rho),
+            None => Some(solution.p[0].clone()),
+        }),
+    };
+    Ok(p.map(|p| quadratic_form(&p, &initial.state)))
+}
+
+fn report(plan: &ProblemPlan, designs: &[PolytopicDesign], guaranteed: Option<f64>, seconds: f64) -> Report {
+    let severity = |design: &PolytopicDesign| match design.answer.outcome {
+        Outcome::Solved => 0,
+        Outcome::Inaccurate(_) => 1,
+        Outcome::Unbounded(_) => 2,
+        Outcome::Infeasible(_) => 3,
+    };
+    let worst = (0..designs.len()).rev().max_by_key(|&k| severity(&designs[k])).unwrap_or(0);
+    let solutions: Option<Vec<&Solution>> = designs.iter().map(|design| design.solution.as_ref()).collect();
+    let matrices = |of: &dyn Fn(&Solution) -> Vec<Mat<f64>>| {
+        let all = solutions.as_ref()?.iter().flat_map(|solution| of(solution));
+        Some(all.map(|matrix| to_rows(&matrix)).collect::<Vec<Rows>>())
+    };
+    let place = |k: usize| if designs.len() > 1 { format!("{}: ", plan.places[k]) } else { String::new() };
+    let blocks = designs.iter().enumerate().flat_map(|(k, design)| {
+        design
+            .answer
+            .blocks
+            .iter()
+            .map(move |block| (format!("{}{}", place(k), block.name), block.verified_lower_bound))
+    });
+    let inside = guaranteed.zip(plan.saturation.as_ref()).map(|(bound, saturation)| bound <= saturation.gamma);
+    let (verdict, verdict_reason) = verdict(plan, &designs[worst].answer, inside);
+    let (objective, objective_is) = objective(plan, designs);
+    Report {
+        status: status(&designs[worst].answer.outcome),
+        convention: "u = -K x",
+        objective: solutions.as_ref().and(objective),
+        objective_is,
+        places: plan.places.clone(),
+        y: matrices(&|solution| solution.y.clone()),
+        p: matrices(&|solution| solution.p.clone()),
+        l: matrices(&|solution| solution.l.clone()),
+        k: matrices(&|solution| solution.gain.clone()),
+        f: plan.high_gain.and_then(|_| matrices(&|solution| solution.auxiliary_gain.clone().unwrap_or_default())),
+        s: solutions.as_ref().and_then(|all| all.iter().map(|solution| solution.s).collect()),
+        guaranteed_cost: guaranteed,
+        inside_certified_set: inside,
+        residuals: Margins(blocks.collect()),
+        iterations: designs.iter().map(|design| design.answer.iterations.len()).sum(),
+        seconds,
+        verdict,
+        verdict_reason,
+        witness: witness(&designs[worst].answer),
+        explanation: designs[worst].explanation.clone(),
+        place: (designs.len() > 1 && severity(&designs[worst]) > 0).then(|| plan.places[worst].clone()),
+    }
+}
+
+fn status(outcome: &Outcome) -> &'static str {
+    match outcome {
+        Outcome::Solved => "solved",
+        Outcome::Infeasible(_) => "infeasible",
+        Outcome::Unbounded(_) => "unbounded",
+        Outcome::Inaccurate(_) => "inaccurate",
+    }
+}
+
+fn objective(plan: &ProblemPlan, designs: &[PolytopicDesign]) -> (Option<f64>, &'static str) {
+    let all = designs.iter().map(|design| design.answer.objective);
+    match (&plan.objective, &plan.saturation) {
+        _ if plan.weights.is_none() => {
+            (all.reduce(f64::min), "largest margin t with every inequality at least tI, tr Y <= n")
+        }
+        (lpv::synthesis::polytopic::Objective::Trace, _) => (Some(all.sum()), "sum of tr Y"),
+        (_, Some(saturation)) if plan.region => {
+            let reach = all.map(|bound| (saturation.gamma / bound).sqrt()).reduce(f64::min);
+            (reach, "reach of the certified set along every direction, in multiples of it")
+        }
+        _ => (all.reduce(f64::max), "largest cost bound of the initial states"),
+    }
+}
+
+/// What a solved design is worth: its inequalities are verified for the Y and L that were found; what flies is K = LY⁻¹,
+/// rounded.
+fn verdict(plan: &ProblemPlan, answer: &Answer, inside: Option<bool>) -> (Verdict, String) {
+    match (&answer.outcome, &plan.scope, inside) {
+        (Outcome::Solved, _, Some(false)) => {
+            (Verdict::Undecided, "the initial state is outside the certified set: x(0)'P x(0) > gamma, and nothing is guaranteed from there".into())
+        }
+        (Outcome::Solved, Scope::Frozen, _) if plan.models.len() > 1 => (
+            Verdict::Undecided,
+            "frozen design: the inequalities hold at each point for a parameter at rest; nothing is guaranteed once it moves".into(),
+        ),
+        (Outcome::Solved, Scope::Polytope(Lyapunov::ParameterDependent { .. }), _) => (
+            Verdict::Numerical,
+            "verified for Y and L at all vertices, for every parameter in the polytope with a rate in the hull of the rate vertices; K is rounded".into(),
+        ),
+        (Outcome::Solved, _, _) => {
+            (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope; K is rounded".into())
+        }
+        (Outcome::Inaccurate(reason), _, _) => {
+            let reason = match reason {
+                InaccurateReason::IterationLimit => "it reached its iteration limit",
+                InaccurateReason::TimeLimit => "it reached its time limit",
+                InaccurateReason::Cancelled => "it was cancelled",
+                InaccurateReason::Stalled => "rounding errors stopped its progress",
+                InaccurateReason::NotVerified => "its answer did not pass the check of its blocks",
+            };
+            (Verdict::Undecided, format!("the solver stopped short: {reason}"))
+        }
+        (Outcome::Infeasible(_), _, _) => (Verdict::Refuted, "no solution exists: the witness contradicts the inequalities".into()),
+        (Outcome::Unbounded(_), _, _) => {
+            (Verdict::Undecided, "the objective grows without end: some state costs nothing; give it a positive weight in Q".into())
+        }
+    }
+}
+
+fn witness(answer: &Answer) -> Option<Vec<NamedMultiplier>> {
+    let Outcome::Infeasible(Witness { multipliers, .. }) = &answer.outcome else { return None };
+    let named = |(z, block): (&Mat<f64>, &lmi::BlockReport)| NamedMultiplier {
+        name: block.name.clone(),
+        multiplier: to_rows(z),
+    };
+    Some(multipliers.iter().zip(&answer.blocks).map(named).collect())
+}
+
+impl Report {
+    /// The answer as text.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let mut line = |name: &str, value: String| text.push_str(&format!("{name:16} {value}\n"));
+        line("status", self.status.into());
+        if let Some(objective) = self.objective {
+            line("objective", format!("{objective:.9e}  ({})", self.objective_is));
+        }
+        if let Some(k) = &self.k {
+            for (place, k) in self.places.iter().zip(k) {
+                for (i, row) in k.iter().enumerate() {
+                    let numbers: Vec<String> = row.iter().map(|value| format!("{value:13.6}")).collect();
+                    let name = if i == 0 { format!("K at {place}") } else { String::new() };
+                    line(&name, format!("[{}]", numbers.join(" ")));
+                }
+            }
+        }
+        if let Some(s) = &self.s {
+            line("s", s.iter().map(|s| format!("{s:.6}")).collect::<Vec<_>>().join(", "));
+        }
+        if let Some(cost) = self.guaranteed_cost {
+            line("guaranteed cost", format!("{cost:.6}  ({})", self.verdict.word()));
+        }
+        if let Some((name, margin)) =
+            self.residuals.0.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| self.k.is_some())
+        {
+            line("least margin", format!("{margin:.3e}  proved, of {} blocks, in \"{name}\"", self.residuals.0.len()));
+        }
+        line("verdict", format!("{}: {}", self.verdict.word(), self.verdict_reason));
+        line("iterations", format!("{} in {:.4} s", self.iterations, self.seconds));
+        if let Some(explanation) = &self.explanation {
+            text.push_str(&format!("{explanation}\n"));
+        }
+        text
+    }
+
+    /// The failure that the status is, if it is one.
+    pub fn failure(&self, path: &std::path::Path) -> Option<Failure> {
+        let place = self.place.as_ref().map_or(String::new(), |place| format!(" at {place}"));
+        let message = format!("{}: {}{place}: {}", path.display(), self.status, self.verdict_reason);
+        match self.status {
+            "solved" => None,
+            "inaccurate" => Some(Failure::NotCertified(message)),
+            _ => Some(Failure::NoOptimum(message + &self.relaxation())),
+        }
+    }
+
+    /// What to relax, or which inequalities contradict each other.
+    fn relaxation(&self) -> String {
+        let Some(explanation) = &self.explanation else { return String::new() };
+        if let Some(carrier) = explanation.cheapest() {
+            return format!("; relax \"{}\" first", carrier.name);
+        }
+        let carriers = explanation.carriers.iter().take(4);
+        let shares: Vec<String> =
+            carriers.map(|carrier| format!("\"{}\" ({:.0} %)", carrier.name, 100.0 * carrier.share)).collect();
+        format!("; relax several of {}, none helps alone", shares.join(", "))
+    }
+}

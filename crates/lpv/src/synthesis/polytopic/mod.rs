@@ -1,0 +1,294 @@
+//! Synthesis over a polytope of vertices, for any A(ρ) = Σ ρᵢAᵢ, B(ρ) = Σ ρᵢBᵢ.
+//!
+//! | Lyapunov function | stabilise | regulate | under saturation |
+//! |---|---|---|---|
+//! | one vertex (LTI) | Lemma 4.1 | Theorem 2.1 | Theorems 5.1, 5.2 |
+//! | common, xᵀY⁻¹x | Theorem 4.1 | Theorem 4.3, Corollary 4.1 | the same with (5.19), (5.20) at every vertex |
+//! | parameter-dependent, xᵀ(Σρᵢ Yᵢ)⁻¹x | Theorem 4.2 | Theorem 4.4 | the same |
+//!
+//! What is found holds for every motion ρ(t) in the polytope; with a parameter-dependent Lyapunov function for those with
+//! ρ̇ in the hull of the rate vertices. Under saturation it holds from every state with V ≤ γ. It is about the LPV model:
+//! for a nonlinear plant it is what the plant's trajectories are embedded in. Theorems 4.5, 5.3 and 5.4 are this module at
+//! single points ρ ([`frozen`]), and guarantee nothing once ρ moves.
+//!
+//! The controller is u = −K(ρ)x with K(ρ) = (Σ ρᵢLᵢ)(Σ ρᵢYᵢ)⁻¹, of which Kᵢ = LᵢYᵢ⁻¹ are the values at the vertices; for
+//! a common Y it is Σ ρᵢKᵢ.
+
+mod inequality;
+mod objective;
+mod rates;
+
+pub use objective::Objective;
+pub use rates::rate_box_vertices;
+
+use super::high_gain::Segment;
+use super::{CostWeights, HighGainOptions, SynthesisError};
+use crate::math::Mat;
+use crate::math::matrix::{inverse_spd, symmetric_part};
+use crate::model::{FrozenModel, Polytope};
+use inequality::{DoubleSum, Unknowns, Weights};
+use lmi::{Answer, Explanation, Expr, Options, Outcome, Problem};
+
+/// The Lyapunov function xᵀY(ρ)⁻¹x.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Lyapunov {
+    /// Y(ρ) = Y.
+    Common,
+    /// Y(ρ) = Σ ρᵢYᵢ.
+    ParameterDependent {
+        /// νₖ with Σᵢ νₖᵢ = 0: ρ̇ is in their hull (4.19).
+        rate_vertices: Vec<Vec<f64>>,
+    },
+}
+
+/// |uᵢ| ≤ σᵢ, and the level of the set {x: V ≤ γ} on which the design is to hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InputBounds {
+    /// σᵢ > 0, one for each input.
+    pub sigma: Vec<f64>,
+    /// γ > 0
+    pub gamma: f64,
+}
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct PolytopicRequest {
+    /// Q ⪰ 0 and R ≻ 0 of the cost; `None` asks for stability alone (Theorems 4.1, 4.2).
+    pub weights: Option<CostWeights>,
+    /// Which Lyapunov function.
+    pub lyapunov: Lyapunov,
+    /// Input saturation (chapter 5).
+    pub saturation: Option<InputBounds>,
+    /// The gain may saturate on the set (Theorems 5.2, 5.4); needs `saturation` and `weights`.
+    pub high_gain: Option<HighGain>,
+    /// What is optimised. Stabilisation has its own: the largest margin.
+    pub objective: Objective,
+}
+
+/// How the gain on K_s = F + s(R⁻¹BᵀP − F) is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HighGain {
+    /// How much cost may be given away, and how robust the sampled loop has to be.
+    pub options: HighGainOptions,
+    /// Time between two samples of the controller; `None`: it is continuous.
+    pub sample_time_s: Option<f64>,
+}
+
+/// What was found, whatever the outcome.
+#[derive(Debug)]
+pub struct PolytopicDesign {
+    /// The solver's answer: outcome, objective, blocks with rigorous margins, witness.
+    pub answer: Answer,
+    /// Why there is no solution, where there is none.
+    pub explanation: Option<Explanation>,
+    /// Y, L and gains where the problem was solved, and at the best point so far where the solver stopped short.
+    pub solution: Option<Solution>,
+}
+
+/// The matrices of a design, one for each vertex.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Yᵢ ≻ 0, n × n; the same N times for a common Lyapunov function.
+    pub y: Vec<Mat<f64>>,
+    /// Lᵢ, m × n.
+    pub l: Vec<Mat<f64>>,
+    /// Pᵢ = Yᵢ⁻¹.
+    pub p: Vec<Mat<f64>>,
+    /// Kᵢ = LᵢYᵢ⁻¹.
+    pub gain: Vec<Mat<f64>>,
+    /// Fᵢ = MᵢYᵢ⁻¹, unsaturated on the set, of the high-gain designs.
+    pub auxiliary_gain: Option<Vec<Mat<f64>>>,
+    /// s on K_s, of the high-gain designs.
+    pub s: Option<f64>,
+}
+
+impl Solution {
+    /// P(ρ) = (Σ ρᵢYᵢ)⁻¹ at convex weights; `None` where it is not definite.
+    pub fn lyapunov_matrix(&self, rho: &[f64]) -> Option<Mat<f64>> {
+        let n = self.y[0].nrows();
+        inverse_spd(&Mat::from_fn(n, n, |i, j| rho.iter().zip(&self.y).map(|(weight, y)| weight * y[(i, j)]).sum()))
+    }
+}
+
+/// The theorem of `request` for `polytope`.
+///
+/// # Errors
+/// Problems without meaning; no high gain that is stable at the sample time. Infeasible, unbounded and inaccurate are
+/// outcomes in the answer.
+///
+/// # Panics
+/// If sizes of weights, bounds, rates or objective do not fit the polytope.
+pub fn synthesize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
+    match &request.weights {
+        Some(weights) => regulate(polytope, request, weights),
+        None => stabilize(polytope, request),
+    }
+}
+
+/// Theorems 4.5, 5.1-5.4 at single models: each is designed as if the parameter stood still there.
+///
+/// # Errors
+/// As [`synthesize`].
+pub fn frozen(models: &[FrozenModel], request: &PolytopicRequest) -> Result<Vec<PolytopicDesign>, SynthesisError> {
+    let request = PolytopicRequest { lyapunov: Lyapunov::Common, ..request.clone() };
+    models.iter().map(|model| synthesize(&Polytope::hull(std::slice::from_ref(model)), &request)).collect()
+}
+
+/// Theorems 4.1 and 4.2: the largest t with every inequality ⪰ tI, where tr Yᵢ ≤ n fixes the scale.
+fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
+    let n = polytope.states();
+    let mut problem = Problem::new();
+    let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
+    let t = problem.scalar("margin");
+    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
+    for (name, block) in sum.stability(&unknowns.l, &t) {
+        problem.positive_definite_by(name, block, 0.0);
+    }
+    for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
+        problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
+        let trace = Expr::constant(Mat::from_fn(1, 1, |_, _| n as f64)) - y.trace();
+        problem.positive_definite_by(format!("scale of Y{}", i + 1), trace, 0.0);
+    }
+    problem.maximize(&t);
+    let answer = problem.solve(&Options::default())?;
+    if answer.objective > LEAST_MARGIN || !matches!(answer.outcome, Outcome::Solved) {
+        return finish(&problem, answer, &unknowns, None);
+    }
+    // the scale allows t = 0 always: the strict problem gives the witness that there is nothing above it
+    let mut strict = Problem::new();
+    let unknowns = Unknowns::new(&mut strict, polytope, &request.lyapunov);
+    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
+    for (name, block) in sum.stability(&unknowns.l, &Expr::zeros(1, 1)) {
+        strict.positive_definite(name, block);
+    }
+    for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
+        strict.positive_definite_by(format!("Y{} ⪰ I", i + 1), *y - Expr::identity(n), 0.0);
+    }
+    let answer = strict.solve(&Options::default())?;
+    finish(&strict, answer, &unknowns, None)
+}
+
+/// Margin of stability, of tr Y = n, below which the answer is taken for zero.
+const LEAST_MARGIN: f64 = 1e-7;
+
+/// Theorems 2.1, 4.3, 4.4, 5.1-5.4.
+fn regulate(
+    polytope: &Polytope,
+    request: &PolytopicRequest,
+    cost: &CostWeights,
+) -> Result<PolytopicDesign, SynthesisError> {
+    let weights = Weights::new(cost).expect("weights are checked to be semidefinite and definite");
+    let mut problem = Problem::new();
+    let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
+    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
+    // with diagonal R the low gain L = M is optimal, and every K_s satisfies the 2^m inequalities (`high_gain`)
+    let mixtures = request.high_gain.filter(|_| !is_diagonal(&cost.r));
+    let auxiliary: Option<Vec<Expr>> = mixtures.map(|_| {
+        let (m, n) = (polytope.inputs(), polytope.states());
+        (0..polytope.len()).map(|i| problem.rectangular(format!("M{}", i + 1), m, n)).collect()
+    });
+    let performance = |l: &[Expr]| -> Vec<(String, Expr)> {
+        let Some(low) = &auxiliary else { return sum.performance("performance", l, &weights) };
+        let inputs = polytope.inputs();
+        let of_mixture = |vertex: usize| {
+            let mixed: Vec<Expr> = l.iter().zip(low).map(|(l, m)| super::high_gain::mixture(vertex, l, m)).collect();
+            sum.performance(&format!("performance of mixture {vertex:0inputs$b}"), &mixed, &weights)
+        };
+        (0..1usize << inputs).flat_map(of_mixture).collect()
+    };
+    for (name, block) in performance(&unknowns.l) {
+        problem.positive_definite(name, block);
+    }
+    for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
+        problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
+    }
+    if let Some(bounds) = &request.saturation {
+        for (name, block) in sum.unsaturated(auxiliary.as_ref().unwrap_or(&unknowns.l), bounds) {
+            problem.positive_definite(name, block);
+        }
+    }
+    request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
+    let answer = problem.solve(&Options::default())?;
+    let mut design = finish(&problem, answer, &unknowns, auxiliary.as_deref())?;
+    let (Some(solution), Some(high_gain)) = (&mut design.solution, request.high_gain) else { return Ok(design) };
+    let low = solution.auxiliary_gain.take().unwrap_or_else(|| solution.gain.clone());
+    let low_l: Vec<Expr> = auxiliary.clone().unwrap_or_else(|| unknowns.l.clone());
+    let mut s = choose(polytope, cost, &solution.p, &low, &high_gain)?;
+    // with a general R the inequalities decide; s = 0 satisfies them, so halving ends
+    let on_segment = |s: f64| -> Vec<Expr> {
+        let end = |i: usize| s * Expr::constant(&weights.r_inverse * polytope.b(i).transpose());
+        low_l.iter().enumerate().map(|(i, low)| (1.0 - s) * low + end(i)).collect()
+    };
+    if mixtures.is_some() {
+        let holds = |s: f64| {
+            let blocks = performance(&on_segment(s));
+            blocks.iter().all(|(_, block)| inverse_spd(&design.answer.value(block)).is_some())
+        };
+        let mut halvings = 0;
+        while s > 0.0 && !holds(s) {
+            s = if halvings < 60 { 0.5 * s } else { 0.0 };
+            halvings += 1;
+        }
+    }
+    solution.l = on_segment(s).iter().map(|l| design.answer.value(l)).collect();
+    solution.gain = solution.l.iter().zip(&solution.p).map(|(l, p)| l * p).collect();
+    solution.auxiliary_gain = Some(low);
+    solution.s = Some(s);
+    Ok(design)
+}
+
+/// The least s of all vertices, each by the rule of [`Segment`].
+fn choose(
+    polytope: &Polytope,
+    cost: &CostWeights,
+    p: &[Mat<f64>],
+    low: &[Mat<f64>],
+    high_gain: &HighGain,
+) -> Result<f64, SynthesisError> {
+    let at = |i: usize| {
+        let model = polytope.vertex(i);
+        Segment::between(&model, cost, &p[i], &low[i]).choose(&model, cost, high_gain.sample_time_s, &high_gain.options)
+    };
+    (0..polytope.len()).map(at).try_fold(f64::INFINITY, |least, s| Ok(least.min(s?)))
+}
+
+/// The Yᵢ without repetition.
+fn distinct<'a>(y: &'a [Expr], lyapunov: &Lyapunov) -> Vec<&'a Expr> {
+    match lyapunov {
+        Lyapunov::Common => vec![&y[0]],
+        Lyapunov::ParameterDependent { .. } => y.iter().collect(),
+    }
+}
+
+fn is_diagonal(matrix: &Mat<f64>) -> bool {
+    (0..matrix.nrows()).all(|i| (0..matrix.ncols()).all(|j| i == j || matrix[(i, j)] == 0.0))
+}
+
+/// Read the matrices from the answer; explain it where it is infeasible.
+fn finish(
+    problem: &Problem,
+    answer: Answer,
+    unknowns: &Unknowns,
+    auxiliary: Option<&[Expr]>,
+) -> Result<PolytopicDesign, SynthesisError> {
+    let explanation = problem.explain(&answer, &Options::default())?;
+    let solution = match answer.outcome {
+        Outcome::Solved | Outcome::Inaccurate(_) => {
+            let values =
+                |of: &[Expr]| -> Vec<Mat<f64>> { of.iter().map(|expression| answer.value(expression)).collect() };
+            let y: Vec<Mat<f64>> = values(&unknowns.y).iter().map(symmetric_part).collect();
+            let l = values(&unknowns.l);
+            let p: Option<Vec<Mat<f64>>> = y.iter().map(inverse_spd).collect();
+            p.map(|p| Solution {
+                gain: l.iter().zip(&p).map(|(l, p)| l * p).collect(),
+                auxiliary_gain: auxiliary.map(|m| values(m).iter().zip(&p).map(|(m, p)| m * p).collect()),
+                s: None,
+                y,
+                l,
+                p,
+            })
+        }
+        Outcome::Infeasible(_) | Outcome::Unbounded(_) => None,
+    };
+    Ok(PolytopicDesign { answer, explanation, solution })
+}
