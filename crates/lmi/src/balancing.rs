@@ -13,6 +13,10 @@ use crate::interior_point::{self, Ending, Solution};
 
 /// Rounds of conjugate gradients for the logarithms of the factors, which need no more than one digit.
 const ROUNDS: usize = 40;
+/// Binary orders of magnitude below the median at which a scaled entry is a rounding error rather than a coefficient, and how
+/// often such are sought.
+const OUTLIER: f64 = 30.0;
+const OUTLIER_PASSES: usize = 4;
 /// Rows, unknowns and costs that differ more than this in size are balanced from the beginning.
 const WIDE: f64 = 1e5;
 /// Relative gap at which a stalled iteration is worth another attempt.
@@ -185,16 +189,37 @@ fn range(equations: &[Equation]) -> (f64, f64) {
 
 /// The same of the scaled problem.
 fn range_after(equations: &[Equation], factors: &Factors) -> (f64, f64) {
-    let rows = factors.rows.len();
-    let scaled = |e: &Equation| {
-        let unknown = e.unknown.map_or(0.0, |k| factors.unknowns[k - rows].log2());
-        Equation { log: e.log + factors.rows[e.i].log2() + factors.rows[e.j].log2() + unknown, ..*e }
-    };
+    let scaled = |e: &Equation| Equation { log: e.log + scaling_log(e, factors), ..*e };
     range(&equations.iter().map(scaled).collect::<Vec<_>>())
 }
 
-/// The least-squares solution by conjugate gradients on the normal equations, preconditioned by their diagonal.
+/// Least squares without the entries that stay far below 1 however the others are scaled: sin π of a basis function is a
+/// zero that rounding left, and its logarithm would pull all factors its way.
 fn factors(program: &Program, equations: &[Equation]) -> Factors {
+    let mut kept = equations.to_vec();
+    for _ in 0..OUTLIER_PASSES {
+        let factors = least_squares(program, &kept);
+        let scaled = |e: &Equation| e.log + scaling_log(e, &factors);
+        let mut logs: Vec<f64> = kept.iter().map(scaled).collect();
+        logs.sort_by(f64::total_cmp);
+        let median = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
+        let count = kept.len();
+        kept.retain(|e| scaled(e) >= median - OUTLIER);
+        if kept.len() == count {
+            return factors;
+        }
+    }
+    least_squares(program, &kept)
+}
+
+/// log₂ of what an entry is multiplied by.
+fn scaling_log(e: &Equation, factors: &Factors) -> f64 {
+    let unknown = e.unknown.map_or(0.0, |k| factors.unknowns[k - factors.rows.len()].log2());
+    factors.rows[e.i].log2() + factors.rows[e.j].log2() + unknown
+}
+
+/// The least-squares solution by conjugate gradients on the normal equations, preconditioned by their diagonal.
+fn least_squares(program: &Program, equations: &[Equation]) -> Factors {
     let rows: usize = program.blocks.iter().map(|block| block.size()).sum();
     let n = rows + program.objective.len();
     let spread = |e: &Equation, value: f64, out: &mut [f64]| {

@@ -176,6 +176,29 @@ fn sharing_one_unknown_between_sparse_and_factored_parts() {
 }
 
 /// Callers solve many problems in parallel.
+/// A scalar times a constant and a matrix unknown in products of other shapes share one block: the largest t with
+/// t·C ⪯ Y, Y ⪯ I and [1, aᵀY; Ya, I] ⪰ 0.
+#[test]
+fn scalars_and_matrices_in_one_block() {
+    let mut problem = Problem::new();
+    let (t, y) = (problem.scalar("t"), problem.symmetric("Y", 3));
+    let c = matrix([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 4.0]]);
+    let column = matrix([[0.5], [0.0], [0.0]]);
+    problem.positive_definite_by("scaled", &y - t.times(&c), 0.0);
+    let product = &y * &column;
+    let block = Expr::symmetric_blocks(vec![
+        vec![Expr::identity(1) - &t],
+        vec![product, Expr::identity(3) - t.times(&Mat::from_fn(3, 3, |i, j| if i == j { 0.1 } else { 0.0 }))],
+    ]);
+    problem.positive_definite_by("mixed", block, 0.0);
+    problem.positive_definite_by("bounded", Expr::identity(3) - &y, 0.0);
+    problem.maximize(&t);
+    let answer = problem.solve(&Options::default()).unwrap();
+    assert!(matches!(answer.outcome, Outcome::Solved));
+    // Y = I allows t = 1/4; the mixed block then holds with room
+    assert!((answer.objective - 0.25).abs() < 1e-7, "{}", answer.objective);
+}
+
 #[test]
 fn everything_can_move_between_threads() {
     fn check<T: Send + Sync>() {}

@@ -213,15 +213,9 @@ fn ends(rate: f64) -> Vec<f64> {
     if rate == 0.0 { vec![0.0] } else { vec![-rate, rate] }
 }
 
-/// Σ fᵢ Xᵢ with numbers fᵢ made from the basis functions. What is zero up to rounding, such as sin π, is zero: a solver
-/// that scales its unknowns would otherwise take it for a number.
+/// Σ fᵢ Xᵢ with numbers fᵢ made from the basis functions.
 fn combination(basis: &[BasisFunction], unknowns: &[Expr], factor: impl Fn(&BasisFunction) -> f64) -> Expr {
-    let factors: Vec<f64> = basis.iter().map(factor).collect();
-    let largest = factors.iter().fold(0.0_f64, |largest, factor| largest.max(factor.abs()));
     let (rows, columns) = (unknowns[0].nrows(), unknowns[0].ncols());
-    factors
-        .into_iter()
-        .zip(unknowns)
-        .filter(|(factor, _)| factor.abs() > 1e-12 * largest)
-        .fold(Expr::zeros(rows, columns), |sum, (factor, unknown)| sum + factor * unknown)
+    let terms = basis.iter().zip(unknowns).map(|(function, unknown)| factor(function) * unknown);
+    terms.fold(Expr::zeros(rows, columns), |sum, term| sum + term)
 }
