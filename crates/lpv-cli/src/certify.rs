@@ -1,11 +1,11 @@
-//! `lpv certify`: check a saved design again, from the plant alone.
+//! `lpv certify`: prove, check or refute a saved design, from the plant alone.
 
 use crate::designs;
 use crate::failure::Failure;
 use crate::output::print;
 use crate::scenario::read_text;
 use clap::Args;
-use lpv::certificate::{BlockMargin, Claim, Verdict, block_margins, check};
+use lpv::certificate::{BlockMargin, Claim, ProofOptions, Verdict, block_margins, check, prove};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -14,6 +14,13 @@ use std::path::PathBuf;
 pub struct CertifyArguments {
     /// Design file, as `lpv run` and `lpv design` write it
     design: PathBuf,
+    /// Largest rate of the scheduling parameter, per second [default: the design's; of a frozen design the largest that
+    /// can be proved]
+    #[arg(long)]
+    rate: Option<f64>,
+    /// Level of the set x'P x <= REGION that is to be certified [default: the design's gamma]
+    #[arg(long)]
+    region: Option<f64>,
     /// Print the claims as JSON instead of text
     #[arg(long)]
     json: bool,
@@ -35,7 +42,24 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
         .plant
         .build()
         .map_err(|error| Failure::Unreadable { file: arguments.design.clone(), message: error.to_string() })?;
-    let claims = check(&design, &*plant);
+    let positive = |key: &str, value: Option<f64>, least: f64| match value {
+        Some(value) if !(value >= least && value.is_finite()) => Err(Failure::BadInput {
+            file: arguments.design.clone(),
+            key: key.into(),
+            message: format!(
+                "is {value}: it has to be a finite number, {}",
+                if least > 0.0 { "above zero" } else { "zero or more" }
+            ),
+        }),
+        _ => Ok(()),
+    };
+    positive("--rate", arguments.rate, 0.0)?;
+    positive("--region", arguments.region, f64::MIN_POSITIVE)?;
+    let mut claims = check(&design, &*plant);
+    match prove(&design, &*plant, &ProofOptions { rate: arguments.rate, level: arguments.region }) {
+        Ok(proofs) => claims.extend(proofs.claims),
+        Err(reason) => claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string())),
+    }
     let verdict = designs::worst(&claims);
     if arguments.json {
         let blocks = block_margins(&design, &*plant);

@@ -103,12 +103,12 @@ fn step_bounds(
             }
             UnmetCondition::Noise => Some("; noise acts, of which the bound knows nothing".into()),
         });
-        let claim = Claim {
-            claim: format!("step {} at t = {} s costs at most {}", k + 1, step.time_s, digits(bound.bound)),
-            verdict: bound.verdict(),
-            margin: bound.level.map_or(f64::INFINITY, |level| level - bound.bound),
-            detail: inside + &others.collect::<String>(),
-        };
+        let claim = Claim::checked(
+            format!("step {} at t = {} s costs at most {}", k + 1, step.time_s, digits(bound.bound)),
+            bound.verdict(),
+            bound.level.map_or(f64::INFINITY, |level| level - bound.bound),
+            inside + &others.collect::<String>(),
+        );
         (bound, claim)
     };
     performance.steps.iter().enumerate().map(bound).unzip()

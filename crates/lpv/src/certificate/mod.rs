@@ -5,10 +5,12 @@
 //! the claim holds at the points that were checked, in floating point.
 
 mod inequality;
+mod proof;
 mod region;
 mod stability;
 
 pub use inequality::{BlockMargin, block_margins};
+pub use proof::{COST_INFLATION, ProofOptions, Proofs, Unprovable, lyapunov_matrix, prove};
 pub use region::{StepBound, StepConditions, UnmetCondition, step_bound, unsaturated_level};
 pub use stability::{StabilityMargin, frozen_stability};
 
@@ -53,6 +55,37 @@ pub struct Claim {
     pub margin: f64,
     /// Where the margin is attained, or what stopped the check.
     pub detail: String,
+    /// What breaks a refuted claim, where it was found by a proof.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub witness: Option<Witness>,
+    /// Cells of the parameter's range that a proof took; 0 where nothing was to be proved.
+    #[serde(default)]
+    pub cells: usize,
+    /// Seconds that it took.
+    #[serde(default)]
+    pub seconds: f64,
+}
+
+impl Claim {
+    /// A claim that was checked at points, without a proof.
+    pub fn checked(claim: impl Into<String>, verdict: Verdict, margin: f64, detail: impl Into<String>) -> Self {
+        let (claim, detail) = (claim.into(), detail.into());
+        Self { claim, verdict, margin, detail, witness: None, cells: 0, seconds: 0.0 }
+    }
+}
+
+/// A motion that breaks a claim: at this parameter and rate the quadratic form of the claim is on the wrong side of zero
+/// along `state`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Witness {
+    /// ρ
+    pub parameter: f64,
+    /// ρ̇
+    pub rate: f64,
+    /// The direction in state space (of a bordered matrix, with the border first).
+    pub state: Vec<f64>,
+    /// Proved bound on the form, which is negative where the claim asks for positive.
+    pub value: f64,
 }
 
 /// Number of parameter values at which frozen stability is computed, for each grid point of the design.
@@ -76,22 +109,18 @@ pub fn check(design: &Design, plant: &dyn Plant) -> Vec<Claim> {
     let verdict = |margin: f64| {
         if margin > 0.0 { Verdict::Numerical } else { Verdict::Refuted }
     };
-    claims.push(Claim {
-        claim: "frozen closed loop is stable".into(),
-        verdict: verdict(-stability.abscissa),
-        margin: -stability.abscissa,
-        detail: format!(
-            "max Re λ = {:.4} 1/s {}, {count} parameter values",
-            stability.abscissa,
-            at(stability.abscissa_at)
-        ),
-    });
-    claims.push(Claim {
-        claim: format!("sampled closed loop is stable at T = {} s", design.sample_time_s),
-        verdict: verdict(1.0 - stability.radius),
-        margin: 1.0 - stability.radius,
-        detail: format!("max |λ| = {:.6} {}, {count} parameter values", stability.radius, at(stability.radius_at)),
-    });
+    claims.push(Claim::checked(
+        "frozen closed loop is stable",
+        verdict(-stability.abscissa),
+        -stability.abscissa,
+        format!("max Re λ = {:.4} 1/s {}, {count} parameter values", stability.abscissa, at(stability.abscissa_at)),
+    ));
+    claims.push(Claim::checked(
+        format!("sampled closed loop is stable at T = {} s", design.sample_time_s),
+        verdict(1.0 - stability.radius),
+        1.0 - stability.radius,
+        format!("max |λ| = {:.6} {}, {count} parameter values", stability.radius, at(stability.radius_at)),
+    ));
     claims
 }
 
@@ -100,21 +129,19 @@ fn inequalities_claim(design: &Design, plant: &dyn Plant) -> Claim {
     let claim = "matrix inequalities hold at every grid point".to_string();
     let worst = margins.iter().min_by(|a, b| nan_first(a.smallest_eigenvalue, b.smallest_eigenvalue));
     match worst {
-        None => {
-            Claim { claim, verdict: Verdict::Undecided, margin: f64::NAN, detail: "the design has no points".into() }
-        }
-        Some(block) => Claim {
+        None => Claim::checked(claim, Verdict::Undecided, f64::NAN, "the design has no points"),
+        Some(block) => Claim::checked(
             claim,
-            verdict: if block.smallest_eigenvalue > 0.0 { Verdict::Numerical } else { Verdict::Refuted },
-            margin: block.smallest_eigenvalue,
-            detail: format!(
+            if block.smallest_eigenvalue > 0.0 { Verdict::Numerical } else { Verdict::Refuted },
+            block.smallest_eigenvalue,
+            format!(
                 "least λ_min = {:.3e} of {} blocks, in \"{}\" at parameter {:.4}",
                 block.smallest_eigenvalue,
                 margins.len(),
                 block.name,
                 block.parameter
             ),
-        },
+        ),
     }
 }
 

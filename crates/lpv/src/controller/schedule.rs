@@ -2,6 +2,7 @@
 
 use crate::math::Mat;
 use crate::math::matrix::{rows, rows_list};
+use crate::math::scalar::Scalar;
 use crate::model::BoxWeights;
 use serde::{Deserialize, Serialize};
 
@@ -54,6 +55,41 @@ impl Schedule {
         }
     }
 
+    /// On how many pieces the gain is one formula; 1 where it is the same formula everywhere.
+    pub fn pieces(&self) -> usize {
+        match self {
+            Schedule::Constant { .. } | Schedule::Vertices { .. } => 1,
+            Schedule::Grid { parameters, period: Some(_), .. } => parameters.len(),
+            Schedule::Grid { parameters, period: None, .. } => parameters.len().saturating_sub(1).max(1),
+        }
+    }
+
+    /// The formula of one piece, in row order: over a grid at position `position` in units of its step, which lies in
+    /// [piece, piece + 1]; else at parameter `rho`.
+    pub fn gain_on_piece<S: Scalar>(&self, piece: usize, position: S, rho: S) -> Vec<S> {
+        let (weighted, first): (Vec<(usize, S)>, &Mat<f64>) = match self {
+            Schedule::Constant { gain } => (vec![(0, S::from(1.0))], gain),
+            Schedule::Grid { parameters, period, gains } => {
+                let count = parameters.len();
+                let width = count.min(4);
+                let first = piece as isize - (width as isize - 1) / 2;
+                let first = if period.is_some() { first } else { first.clamp(0, (count - width) as isize) };
+                (lagrange_weights(first, width, count, position), &gains[0])
+            }
+            Schedule::Vertices { weights, gains } => (weights.at(rho).into_iter().enumerate().collect(), &gains[0]),
+        };
+        let (m, n) = (first.nrows(), first.ncols());
+        let mut gain = vec![S::from(0.0); m * n];
+        for (k, weight) in weighted {
+            let k = match self {
+                Schedule::Constant { gain } => gain,
+                Schedule::Grid { gains, .. } | Schedule::Vertices { gains, .. } => &gains[k],
+            };
+            gain.iter_mut().enumerate().for_each(|(at, entry)| *entry = *entry + weight * k[(at / n, at % n)]);
+        }
+        gain
+    }
+
     /// The gain at parameter `rho` as a matrix.
     pub fn gain_matrix(&self, rho: f64) -> Mat<f64> {
         let first = match self {
@@ -98,10 +134,15 @@ pub(crate) fn cubic_weights(parameters: &[f64], period: Option<f64>, rho: f64) -
             (position, (position.floor() as isize - (width as isize - 1) / 2).clamp(0, (count - width) as isize))
         }
     };
+    lagrange_weights(first, width, count, position)
+}
+
+/// Weights of the polynomial through `width` nodes from `first` on, of a grid of `count` that wraps.
+fn lagrange_weights<S: Scalar>(first: isize, width: usize, count: usize, position: S) -> Vec<(usize, S)> {
     (0..width)
         .map(|i| {
             let node = (first + i as isize) as f64;
-            let weight = (0..width).filter(|&j| j != i).fold(1.0, |product, j| {
+            let weight = (0..width).filter(|&j| j != i).fold(S::from(1.0), |product, j| {
                 product * (position - (first + j as isize) as f64) / (node - (first + j as isize) as f64)
             });
             ((first + i as isize).rem_euclid(count as isize) as usize, weight)

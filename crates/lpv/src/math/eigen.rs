@@ -14,6 +14,12 @@ pub fn smallest_eigenvalue(matrix: &Mat<f64>) -> f64 {
     symmetric_eigenvalues(matrix).first().copied().unwrap_or(f64::NAN)
 }
 
+/// A unit eigenvector of λ_min of a symmetric matrix; `None` for a matrix with a non-finite entry.
+pub fn smallest_eigenvector(matrix: &Mat<f64>) -> Option<Vec<f64>> {
+    let eigen = matrix.self_adjoint_eigen(Side::Lower).ok()?;
+    Some((0..matrix.nrows()).map(|i| eigen.U()[(i, 0)]).collect())
+}
+
 /// The eigenvalues (re, im) of a real square matrix, in no particular order.
 pub fn eigenvalues(matrix: &Mat<f64>) -> Vec<(f64, f64)> {
     match matrix.eigenvalues() {

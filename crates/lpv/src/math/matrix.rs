@@ -63,6 +63,21 @@ pub fn inverse_spd(matrix: &Mat<f64>) -> Option<Mat<f64>> {
     Some(symmetric_part(&inverse))
 }
 
+/// L⁻¹ of the Cholesky factorisation X = LLᵀ of a symmetric positive definite matrix; `None` when it fails.
+pub fn cholesky_inverse(matrix: &Mat<f64>) -> Option<Mat<f64>> {
+    let n = matrix.nrows();
+    let factorisation = matrix.llt(Side::Lower).ok()?;
+    let l = factorisation.L();
+    let mut inverse = Mat::<f64>::identity(n, n);
+    for j in 0..n {
+        for i in j..n {
+            let sum: f64 = (j..i).map(|k| l[(i, k)] * inverse[(k, j)]).sum();
+            inverse[(i, j)] = (inverse[(i, j)] - sum) / l[(i, i)];
+        }
+    }
+    is_finite(&inverse).then_some(inverse)
+}
+
 /// X⁻¹ of a general square matrix by LU with partial pivoting. A singular X gives non-finite entries.
 pub fn inverse(matrix: &Mat<f64>) -> Mat<f64> {
     matrix.partial_piv_lu().inverse()

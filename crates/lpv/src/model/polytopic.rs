@@ -5,6 +5,7 @@
 use super::{GridModel, linearize};
 use crate::math::Mat;
 use crate::math::matrix::{least_squares, rows, rows_list};
+use crate::math::scalar::Scalar;
 use crate::plant::{Feature, Plant};
 use serde::{Deserialize, Serialize};
 
@@ -30,9 +31,11 @@ impl BoxWeights {
     }
 
     /// The weights at parameter `rho`.
-    pub fn at(&self, rho: f64) -> Vec<f64> {
-        let features: Vec<f64> = self.features.iter().map(|feature| feature.value(rho)).collect();
-        let weight = |corner: &Vec<f64>| corner.iter().zip(&features).map(|(c, f)| (1.0 + c * f) / 2.0).product();
+    pub fn at<S: Scalar>(&self, rho: S) -> Vec<S> {
+        let features: Vec<S> = self.features.iter().map(|feature| feature.value(rho)).collect();
+        let weight = |corner: &Vec<f64>| {
+            corner.iter().zip(&features).fold(S::from(1.0), |product, (&c, &f)| product * ((f * c + 1.0) / 2.0))
+        };
         self.corners.iter().map(weight).collect()
     }
 

@@ -1,6 +1,6 @@
 //! The double integrator of thesis chapter V, equation (5.4).
 
-use super::{Description, Equations, OperatingPoint, Signal};
+use super::{Description, Equations, Signal};
 use crate::math::scalar::Scalar;
 
 /// ẋ₁ = x₂, ẋ₂ = u + w, with the position measured.
@@ -30,8 +30,8 @@ impl Equations for DoubleIntegrator {
     }
 
     /// The origin, at rest.
-    fn trim(&self, _rho: f64) -> OperatingPoint {
-        OperatingPoint { state: vec![0.0; 2], input: vec![0.0] }
+    fn trim<S: Scalar>(&self, _rho: S) -> (Vec<S>, Vec<S>) {
+        (vec![S::from(0.0); 2], vec![S::from(0.0)])
     }
 
     fn dynamics<S: Scalar>(&self, x: &[S], u: &[S], w: &[S], dx: &mut [S]) {

@@ -2,6 +2,7 @@
 
 use super::{Description, Equations, OperatingPoint, Plant};
 use crate::math::scalar::{Dual, LANES, derivative, dual};
+use crate::math::taylor::{Taylor, TaylorDual};
 
 /// The Jacobian of `function` at `point`, `rows` × `point.len()`, in row order.
 fn jacobian(point: &[f64], rows: usize, jacobian: &mut [f64], function: impl Fn(&[Dual], &mut [Dual])) {
@@ -34,7 +35,8 @@ impl<E: Equations> Plant for E {
     }
 
     fn trim(&self, rho: f64) -> OperatingPoint {
-        Equations::trim(self, rho)
+        let (state, input) = Equations::trim(self, rho);
+        OperatingPoint { state, input }
     }
 
     fn dynamics(&self, x: &[f64], u: &[f64], w: &[f64], dx: &mut [f64]) {
@@ -53,6 +55,26 @@ impl<E: Equations> Plant for E {
     fn dynamics_by_input(&self, x: &[f64], u: &[f64], w: &[f64], b: &mut [f64]) {
         let (rows, x, w) = (x.len(), constants(x), constants(w));
         jacobian(u, rows, b, |u, dx| Equations::dynamics(self, &x, u, &w, dx));
+    }
+
+    fn linearization_over(&self, rho: Taylor) -> (Vec<Taylor>, Vec<Taylor>) {
+        let (x, u) = Equations::trim(self, rho);
+        let w = vec![TaylorDual::from(0.0); Equations::description(self).disturbances.len()];
+        let (n, m) = (x.len(), u.len());
+        let lift = |values: &[Taylor], variable: Option<usize>| -> Vec<TaylorDual> {
+            values.iter().enumerate().map(|(i, &value)| TaylorDual::new(value, variable == Some(i))).collect()
+        };
+        let (mut a, mut b) = (vec![Taylor::from(0.0); n * n], vec![Taylor::from(0.0); n * m]);
+        let mut dx = vec![TaylorDual::from(0.0); n];
+        for j in 0..n {
+            Equations::dynamics(self, &lift(&x, Some(j)), &lift(&u, None), &w, &mut dx);
+            dx.iter().enumerate().for_each(|(i, dx)| a[i * n + j] = dx.derivative);
+        }
+        for j in 0..m {
+            Equations::dynamics(self, &lift(&x, None), &lift(&u, Some(j)), &w, &mut dx);
+            dx.iter().enumerate().for_each(|(i, dx)| b[i * m + j] = dx.derivative);
+        }
+        (a, b)
     }
 
     fn dynamics_by_disturbance(&self, x: &[f64], u: &[f64], w: &[f64], l: &mut [f64]) {

@@ -1,6 +1,6 @@
 //! A linear plant from its matrices.
 
-use super::{Description, Equations, OperatingPoint, PlantParameterError, Signal};
+use super::{Description, Equations, PlantParameterError, Signal};
 use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
@@ -80,11 +80,9 @@ impl Equations for Linear {
     }
 
     /// The origin.
-    fn trim(&self, _rho: f64) -> OperatingPoint {
-        OperatingPoint {
-            state: vec![0.0; self.description.states.len()],
-            input: vec![0.0; self.description.inputs.len()],
-        }
+    fn trim<S: Scalar>(&self, _rho: S) -> (Vec<S>, Vec<S>) {
+        let zeros = |count| vec![S::from(0.0); count];
+        (zeros(self.description.states.len()), zeros(self.description.inputs.len()))
     }
 
     fn dynamics<S: Scalar>(&self, x: &[S], u: &[S], w: &[S], dx: &mut [S]) {

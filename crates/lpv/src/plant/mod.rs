@@ -19,6 +19,7 @@ pub use pendulum::Pendulum;
 pub use quadrotor::{Quadrotor, QuadrotorParameters};
 
 use crate::math::scalar::Scalar;
+use crate::math::taylor::Taylor;
 use serde::{Deserialize, Serialize};
 
 /// Name and unit of one component of a state, input, disturbance or output.
@@ -51,10 +52,11 @@ pub enum Feature {
 
 impl Feature {
     /// The value at parameter `rho`.
-    pub fn value(self, rho: f64) -> f64 {
+    pub fn value<S: Scalar>(self, rho: S) -> S {
+        let (sin, cos) = rho.sin_cos();
         match self {
-            Feature::Sin => rho.sin(),
-            Feature::Cos => rho.cos(),
+            Feature::Sin => sin,
+            Feature::Cos => cos,
         }
     }
 }
@@ -145,8 +147,8 @@ pub trait Equations: Send + Sync {
     /// What the plant is.
     fn description(&self) -> &Description;
 
-    /// The operating point at scheduling parameter `rho` (ignored by plants without one).
-    fn trim(&self, rho: f64) -> OperatingPoint;
+    /// x* and u* at scheduling parameter `rho` (ignored by plants without one): f(x*, u*, 0) = 0.
+    fn trim<S: Scalar>(&self, rho: S) -> (Vec<S>, Vec<S>);
 
     /// ẋ = f(x, u, w), written to `dx`.
     fn dynamics<S: Scalar>(&self, x: &[S], u: &[S], w: &[S], dx: &mut [S]);
@@ -181,6 +183,10 @@ pub trait Plant: Send + Sync {
 
     /// C = ∂h/∂x, n_y × n (2.54).
     fn measurement_by_state(&self, x: &[f64], v: &[f64], c: &mut [f64]);
+
+    /// A and B at the operating points of `rho`, a function of one variable: enclosures of values and derivatives, in row
+    /// order.
+    fn linearization_over(&self, rho: Taylor) -> (Vec<Taylor>, Vec<Taylor>);
 
     /// M = ∂h/∂v, n_y × n_y (2.55).
     fn measurement_by_noise(&self, x: &[f64], v: &[f64], m: &mut [f64]);

@@ -1,6 +1,6 @@
 //! The inverted pendulum of thesis example 4.1, equations (4.37)-(4.38).
 
-use super::{Description, Equations, OperatingPoint, Signal};
+use super::{Description, Equations, Signal};
 use crate::math::scalar::Scalar;
 
 /// ẋ₁ = x₂, ẋ₂ = −0.1 x₂ + sin x₁ + u + w, with the angle measured.
@@ -30,8 +30,8 @@ impl Equations for Pendulum {
     }
 
     /// Upright, at rest.
-    fn trim(&self, _rho: f64) -> OperatingPoint {
-        OperatingPoint { state: vec![0.0; 2], input: vec![0.0] }
+    fn trim<S: Scalar>(&self, _rho: S) -> (Vec<S>, Vec<S>) {
+        (vec![S::from(0.0); 2], vec![S::from(0.0)])
     }
 
     fn dynamics<S: Scalar>(&self, x: &[S], u: &[S], w: &[S], dx: &mut [S]) {

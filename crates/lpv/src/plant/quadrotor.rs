@@ -1,6 +1,6 @@
 //! The quadrotor of the thesis: a rigid body with four rotors, equations (3.26), noise entry (6.8), measurement (6.9).
 
-use super::{Description, Equations, Feature, OperatingPoint, Scene, Scheduling, Signal};
+use super::{Description, Equations, Feature, Scene, Scheduling, Signal};
 use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -123,10 +123,10 @@ impl Equations for Quadrotor {
     }
 
     /// Hover at heading ψ: level, at rest, u* = mg/4 on each rotor (3.30)-(3.31).
-    fn trim(&self, psi_rad: f64) -> OperatingPoint {
-        let mut state = vec![0.0; 12];
+    fn trim<S: Scalar>(&self, psi_rad: S) -> (Vec<S>, Vec<S>) {
+        let mut state = vec![S::from(0.0); 12];
         state[11] = psi_rad;
-        OperatingPoint { state, input: vec![self.parameters.mass_kg * self.parameters.gravity_m_s2 / 4.0; 4] }
+        (state, vec![S::from(self.parameters.mass_kg * self.parameters.gravity_m_s2 / 4.0); 4])
     }
 
     /// (6.8): (3.26) with the process noise wᵢ added to each rotor force.

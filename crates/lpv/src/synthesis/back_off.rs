@@ -20,6 +20,9 @@ use crate::model::FrozenModel;
 const FACTORS: [f64; 5] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
 /// The largest ε of a design for a moving parameter: what needs more is met by a finer schedule or a finer grid.
 const LARGEST_MOVING: f64 = 1e-3;
+/// What is added to the ε of a design for a moving parameter, so that a proof does not need cells without number: what holds by
+/// ε on the cell's middle holds on a cell of width √ε.
+const PROOF_MARGIN: f64 = 1e-3;
 
 /// Σ of the saturated methods: the bounds σᵢ of the inputs and the level γ.
 pub(super) struct Saturation<'a> {
@@ -104,6 +107,7 @@ pub(super) fn back_off_moving(
         })
     };
     let factor = FACTORS.into_iter().filter(|&factor| factor <= LARGEST_MOVING).find(suffices)?;
+    let factor = factor + PROOF_MARGIN;
     lyapunov.back_off(1.0 + factor);
     Some(factor)
 }

@@ -1,0 +1,340 @@
+//! Proofs over the continuous range of the parameter, between grid points too, with every rounding accounted for.
+//!
+//! The range is cut into cells. On each cell the matrix of a claim is enclosed by its Taylor form of second order in
+//! interval arithmetic: the plant's equations, their Jacobians, the schedule that flies and the Lyapunov function are all
+//! evaluated over intervals, none is sampled. Gershgorin's theorem after a congruence then proves it definite on the whole
+//! cell, or an eigenvector in interval arithmetic refutes it in the middle, or the cell is halved. The claims are affine in
+//! the parameter's rate, so that both ends of its interval are enough.
+//!
+//! The solver is not asked, and no number but P (or Y), the gains and the model enters. `docs/proved.md` says what is proved
+//! and what is not.
+
+mod closed_loop;
+mod matrix;
+
+pub use closed_loop::Unprovable;
+
+use super::{Claim, Verdict, Witness};
+use crate::math::interval::Interval;
+use crate::plant::Plant;
+use crate::synthesis::Design;
+use closed_loop::{ClosedLoop, Decrease, Place};
+use matrix::{CellMatrix, Definiteness};
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// Half-widths of cells, in pieces, below which a cell is not halved any more: for a claim that is asked for, and while the
+/// largest rate is sought.
+const LEAST_HALF: f64 = 1.0 / 2048.0;
+const LEAST_HALF_OF_SEARCH: f64 = 1.0 / 1024.0;
+/// Halvings after which a cell takes the second derivatives of the one that it is part of.
+const OWN_DERIVATIVES: usize = 3;
+/// What the level of the certified set is multiplied by until it is proved: between grid points a little is lost.
+const LEVELS: [f64; 5] = [1.0, 0.999, 0.995, 0.98, 0.9];
+/// By this factor the cost bound of a frozen design may be exceeded when it is proved for a moving parameter.
+pub const COST_INFLATION: f64 = 1.1;
+/// Rates are found to this factor.
+const RATE_RATIO: f64 = 1.03;
+/// Rates outside are not sought.
+const RATES: [f64; 2] = [1e-4, 1e5];
+
+/// A cell of the range of the parameter.
+struct Cell<M> {
+    place: Place,
+    /// How often the piece was halved.
+    depth: usize,
+    matrix: M,
+}
+
+/// How a matrix is enclosed on a place, within the matrix of an outer cell if there is one.
+type Enclose<'a, M> = Box<dyn Fn(&Place, Option<&M>) -> M + Sync + 'a>;
+
+/// Cells of every piece and of every variant of a claim (mixtures, inputs), refined as far as a claim ever needed.
+struct Cells<'a, M> {
+    groups: Vec<Vec<Cell<M>>>,
+    enclose: Enclose<'a, M>,
+}
+
+/// How an attempt to prove a claim on all cells ended.
+#[derive(Clone, Debug)]
+enum Attempt {
+    /// With the least margin.
+    Proved(f64),
+    /// At this position, for this rate.
+    Refuted { t: f64, rate: f64, direction: Vec<f64>, value: f64 },
+    /// At this position.
+    Open { t: f64, half: f64 },
+}
+
+/// The worse of two.
+fn worse(a: Attempt, b: Attempt) -> Attempt {
+    match (&a, &b) {
+        (Attempt::Refuted { .. }, _) => a,
+        (_, Attempt::Refuted { .. }) => b,
+        (Attempt::Open { .. }, _) => a,
+        (_, Attempt::Open { .. }) => b,
+        (Attempt::Proved(x), Attempt::Proved(y)) => Attempt::Proved(x.min(*y)),
+    }
+}
+
+impl<'a, M: Send + Sync> Cells<'a, M> {
+    fn new(pieces: usize, variants: usize, enclose: impl Fn(&Place, Option<&M>) -> M + Sync + 'a) -> Self {
+        let groups: Vec<(usize, usize)> =
+            (0..pieces).flat_map(|piece| (0..variants).map(move |v| (piece, v))).collect();
+        let first = |&(piece, variant): &(usize, usize)| {
+            let place = Place { piece, variant, middle: piece as f64 + 0.5, half: 0.5 };
+            vec![Cell { place, depth: 0, matrix: enclose(&place, None) }]
+        };
+        Self { groups: groups.par_iter().map(first).collect(), enclose: Box::new(enclose) }
+    }
+
+    fn len(&self) -> usize {
+        self.groups.iter().map(Vec::len).sum()
+    }
+
+    /// Prove `claims` (each with the rate that it is for) of every cell, with cells of half-width at least `least`.
+    fn prove(&mut self, least: f64, claims: &(dyn Fn(&M, f64) -> Vec<(f64, Definiteness)> + Sync)) -> Attempt {
+        let enclose = &self.enclose;
+        let of_group = |cells: &mut Vec<Cell<M>>| {
+            let mut margin = f64::INFINITY;
+            let mut left = std::mem::take(cells);
+            left.reverse();
+            let mut outcome = None;
+            while let Some(cell) = left.pop() {
+                let Place { middle, half, .. } = cell.place;
+                if outcome.is_some() {
+                    cells.push(cell);
+                    continue;
+                }
+                let mut open = false;
+                for (rate, definiteness) in claims(&cell.matrix, half) {
+                    match definiteness {
+                        Definiteness::Proved(found) => margin = margin.min(found),
+                        Definiteness::Refuted { direction, value } => {
+                            outcome = Some(Attempt::Refuted { t: middle, rate, direction, value });
+                        }
+                        Definiteness::Open => open = true,
+                    }
+                }
+                if !open || outcome.is_some() {
+                    cells.push(cell);
+                    continue;
+                }
+                if 0.5 * half < least {
+                    outcome = Some(Attempt::Open { t: middle, half });
+                    cells.push(cell);
+                    continue;
+                }
+                let (half, depth) = (0.5 * half, cell.depth + 1);
+                let outer = (depth > OWN_DERIVATIVES).then_some(&cell.matrix);
+                // the left one is next
+                for middle in [middle + half, middle - half] {
+                    let place = Place { middle, half, ..cell.place };
+                    left.push(Cell { place, depth, matrix: enclose(&place, outer) });
+                }
+            }
+            outcome.unwrap_or(Attempt::Proved(margin))
+        };
+        self.groups.par_iter_mut().map(of_group).reduce(|| Attempt::Proved(f64::INFINITY), worse)
+    }
+}
+
+/// What is to be proved of a design.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ProofOptions {
+    /// The parameter's largest rate; `None`: the design's own, and for a frozen design the largest that can be proved.
+    pub rate: Option<f64>,
+    /// Level of the set {V ≤ γ}; `None`: the design's.
+    pub level: Option<f64>,
+}
+
+/// What is proved of a design: its claims, and the conditions under which its cost bounds hold.
+#[derive(Clone, Debug)]
+pub struct Proofs {
+    /// The claims, in the order in which they build on each other.
+    pub claims: Vec<Claim>,
+    /// Largest rate of the parameter for which stability (and invariance of the set) is proved.
+    pub stable_up_to: Option<f64>,
+    /// Largest rate for which the cost bound is proved, inflated by `cost_factor`.
+    pub cost_up_to: Option<f64>,
+    /// The cost is at most this times V(x(0)).
+    pub cost_factor: f64,
+    /// Level of the set that the saturated methods are certified on; `None` where inputs are not limited.
+    pub level: Option<f64>,
+}
+
+/// Prove what can be proved of `design`, for the plant that it names:
+///
+/// 1. P(ρ) ≻ 0;
+/// 2. of the saturated methods: on {V ≤ γ} the low gain (K, or F of high gain) does not saturate;
+/// 3. V falls along every motion of the LPV model with |ρ̇| ≤ r, under every mixture of saturated rows, so that {V ≤ γ} is
+///    invariant;
+/// 4. the cost is at most V(x(0)) times a factor for |ρ̇| ≤ r.
+pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Result<Proofs, Unprovable> {
+    let closed_loop = ClosedLoop::new(design, plant)?;
+    let parameter = plant.description().scheduling.as_ref();
+    let words = Words {
+        every: parameter.map_or(String::new(), |s| format!(" for every {}", s.parameter)),
+        rate: parameter.map_or(String::new(), |s| format!("|d{}/dt|", s.parameter)),
+        unit: parameter.map_or(String::new(), |s| format!("{}/s", s.unit)),
+    };
+    let mut claims = vec![definite(&closed_loop, &words)];
+    let gamma = options.level.or(design.method.gamma());
+    let mut level = None;
+    let sigma = design.controller.limits.symmetric_bound(&design.controller.operating_input);
+    if let (Some(gamma), Some(sigma)) = (gamma, &sigma) {
+        let (claim, proved_level) = unsaturated(&closed_loop, &words, sigma, gamma);
+        claims.push(claim);
+        level = Some(proved_level);
+    }
+
+    let started = Instant::now();
+    let mut cells =
+        Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place, outer| closed_loop.decrease(place, outer));
+    let own = design.rate_bounded.as_ref().map(|bounded| bounded.rate);
+    let asked = if closed_loop.has_parameter { options.rate.or(own) } else { Some(0.0) };
+    let cost_factor = if own.is_some() || !closed_loop.has_parameter { 1.0 } else { COST_INFLATION };
+    let what = match level {
+        Some(level) => format!("the set x'P x <= {level} is invariant"),
+        None => "x'P x decreases".into(),
+    };
+    let mut reached = [None, None];
+    for (place, (cost, factor, what)) in
+        [(0.0, 1.0, what), (1.0, cost_factor, format!("the cost is at most {cost_factor} x(0)'P x(0)"))]
+            .into_iter()
+            .enumerate()
+    {
+        let (rate, attempt) = match asked {
+            Some(rate) => (rate, decrease(&mut cells, LEAST_HALF, rate, factor, cost)),
+            None => largest_rate(&mut cells, factor, cost),
+        };
+        if let Attempt::Proved(_) = attempt {
+            reached[place] = Some(rate);
+        }
+        let motion = if words.rate.is_empty() {
+            String::new()
+        } else {
+            format!(" for {} <= {rate:.4} {}", words.rate, words.unit)
+        };
+        let claim = format!("{what}{motion}{}", words.every);
+        claims.push(words.claim(claim, attempt, &closed_loop, cells.len(), started));
+    }
+    Ok(Proofs { claims, stable_up_to: reached[0], cost_up_to: reached[1], cost_factor, level })
+}
+
+/// P(ρ) of the Lyapunov function that [`prove`] is about; `None` where there is none.
+pub fn lyapunov_matrix(design: &Design, plant: &dyn Plant, rho: f64) -> Option<crate::math::Mat<f64>> {
+    ClosedLoop::new(design, plant).ok()?.form.p(rho)
+}
+
+/// Names of the parameter and its units in claims.
+struct Words {
+    every: String,
+    rate: String,
+    unit: String,
+}
+
+impl Words {
+    fn claim(
+        &self,
+        claim: String,
+        attempt: Attempt,
+        closed_loop: &ClosedLoop,
+        cells: usize,
+        started: Instant,
+    ) -> Claim {
+        let place = |t: f64| match closed_loop.has_parameter {
+            true => format!(" at parameter {:.6}", closed_loop.parameter(t)),
+            false => String::new(),
+        };
+        let (verdict, margin, detail, witness) = match attempt {
+            Attempt::Proved(margin) => {
+                (Verdict::Proved, margin, format!("relative margin {margin:.1e}, {cells} cells"), None)
+            }
+            Attempt::Refuted { t, rate, direction, value } => {
+                let witness = Witness {
+                    parameter: closed_loop.parameter(t),
+                    rate,
+                    state: closed_loop.state(t, &direction),
+                    value,
+                };
+                let detail = format!("fails{} with rate {rate:.4}", place(t));
+                (Verdict::Refuted, value, detail, Some(witness))
+            }
+            Attempt::Open { t, half } => {
+                let detail = format!(
+                    "open{} on a cell of {:.1e} of a grid step: too close to the edge to be told",
+                    place(t),
+                    2.0 * half
+                );
+                (Verdict::Undecided, f64::NAN, detail, None)
+            }
+        };
+        Claim { claim, verdict, margin, detail, witness, cells, seconds: started.elapsed().as_secs_f64() }
+    }
+}
+
+fn definite(closed_loop: &ClosedLoop, words: &Words) -> Claim {
+    let started = Instant::now();
+    let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place, outer: Option<&CellMatrix>| {
+        closed_loop.bordered(place, None, outer)
+    });
+    let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
+    words.claim(format!("P is positive definite{}", words.every), attempt, closed_loop, cells.len(), started)
+}
+
+/// The claim for the largest level of [`LEVELS`] times γ that is proved, or else for γ; and that level.
+fn unsaturated(closed_loop: &ClosedLoop, words: &Words, sigma: &[f64], gamma: f64) -> (Claim, f64) {
+    let started = Instant::now();
+    let attempt = |level: f64| {
+        let mut cells =
+            Cells::new(closed_loop.pieces, closed_loop.inputs(), |place: &Place, outer: Option<&CellMatrix>| {
+                let bound = Interval::point(sigma[place.variant]) * sigma[place.variant] / level;
+                closed_loop.bordered(place, Some(bound), outer)
+            });
+        let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
+        (level, attempt, cells.len())
+    };
+    let mut attempts = LEVELS.into_iter().map(|factor| attempt(factor * gamma));
+    let first = attempts.next().expect("there are levels");
+    let (level, attempt, cells) = match first.1 {
+        Attempt::Proved(_) => first,
+        _ => attempts.find(|(_, attempt, _)| matches!(attempt, Attempt::Proved(_))).unwrap_or(first),
+    };
+    let claim = format!("the low gain does not saturate on x'P x <= {level}{}", words.every);
+    (words.claim(claim, attempt, closed_loop, cells, started), level)
+}
+
+/// κ(constant ± r rate) + c cost ≻ 0 on every cell.
+fn decrease(cells: &mut Cells<Decrease>, least: f64, rate: f64, factor: f64, cost: f64) -> Attempt {
+    cells.prove(least, &|parts: &Decrease, half| {
+        let ends = if rate == 0.0 { vec![0.0] } else { vec![-rate, rate] };
+        let of_end = |end: f64| {
+            let terms = [(factor, &parts.constant), (factor * end, &parts.rate), (cost, &parts.cost)];
+            (end, CellMatrix::combination(&terms).is_positive(half))
+        };
+        ends.into_iter().map(of_end).collect()
+    })
+}
+
+/// The largest rate for which [`decrease`] is proved, by bisection; the attempt at rest where even that fails.
+fn largest_rate(cells: &mut Cells<Decrease>, factor: f64, cost: f64) -> (f64, Attempt) {
+    let mut best = (0.0, decrease(cells, LEAST_HALF_OF_SEARCH, 0.0, factor, cost));
+    if !matches!(best.1, Attempt::Proved(_)) {
+        return best;
+    }
+    let [mut rate, most] = RATES;
+    let mut fails = f64::INFINITY;
+    while fails / best.0.max(RATES[0]) > RATE_RATIO && rate <= most {
+        match decrease(cells, LEAST_HALF_OF_SEARCH, rate, factor, cost) {
+            proved @ Attempt::Proved(_) => best = (rate, proved),
+            _ => fails = rate,
+        }
+        rate = match fails.is_finite() {
+            true if best.0 == 0.0 => return best,
+            true => (best.0 * fails).sqrt(),
+            false => 8.0 * rate,
+        };
+    }
+    best
+}
