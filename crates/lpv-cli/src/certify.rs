@@ -56,18 +56,27 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     positive("--rate", arguments.rate, 0.0)?;
     positive("--region", arguments.region, f64::MIN_POSITIVE)?;
     let mut claims = check(&design, &*plant);
+    let mut verdict = designs::worst(&claims);
     match prove(&design, &*plant, &ProofOptions { rate: arguments.rate, level: arguments.region }) {
-        Ok(proofs) => claims.extend(proofs.claims),
+        Ok(proofs) => {
+            // the rates found for a frozen design are a finding, not a claim that it makes
+            let counted = |claim: &&Claim| proofs.asked || claim.verdict == Verdict::Refuted;
+            verdict = proofs.claims.iter().filter(counted).map(|claim| claim.verdict).fold(verdict, Verdict::min);
+            claims.extend(proofs.claims);
+        }
+        Err(reason) if arguments.rate.is_some() || arguments.region.is_some() => {
+            verdict = verdict.min(Verdict::Undecided);
+            claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string()));
+        }
         Err(reason) => claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string())),
     }
-    let verdict = designs::worst(&claims);
     if arguments.json {
         let blocks = block_margins(&design, &*plant);
         let certificate = Certificate { design: &design.name, verdict, claims: &claims, blocks };
         let json = serde_json::to_string_pretty(&certificate).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;
     } else {
-        print(&designs::text(&design.name, &claims))?;
+        print(&designs::text(&design.name, verdict, &claims))?;
     }
     match verdict {
         Verdict::Proved | Verdict::Numerical => Ok(()),

@@ -55,7 +55,7 @@ fn run_scenario(arguments: &DesignArguments) -> Result<(), Failure> {
         print(&json)?;
     } else {
         for (plan, checked) in scenario.controllers.iter().zip(&checked) {
-            print(&designs::text(&plan.label, &checked.claims))?;
+            print(&designs::text(&plan.label, checked.verdict(), &checked.claims))?;
         }
         print(&place.display().to_string())?;
     }

@@ -68,9 +68,9 @@ pub fn worst(claims: &[Claim]) -> Verdict {
     claims.iter().map(|claim| claim.verdict).min().unwrap_or(Verdict::Undecided)
 }
 
-/// The claims about the design called `label`, as text, a line each.
-pub fn text(label: &str, claims: &[Claim]) -> String {
-    let mut text = format!("{label}: {}\n", worst(claims).word());
+/// The verdict on the design called `label` and the claims about it, as text, a line each.
+pub fn text(label: &str, verdict: Verdict, claims: &[Claim]) -> String {
+    let mut text = format!("{label}: {}\n", verdict.word());
     for claim in claims {
         text.push_str(&format!("  {}: {} ({})\n", claim.verdict.word(), claim.claim, claim.detail));
     }

@@ -58,7 +58,9 @@ fn certify_checks_every_saved_design() {
             let certificate = parsed(&place.succeed(&format!("certify designs/{file} --json")));
             assert_eq!(certificate["verdict"], "numerical");
             let claims = certificate["claims"].as_array().unwrap();
-            assert!(claims.iter().all(|claim| claim["margin"].as_f64().unwrap() > 0.0));
+            assert!(
+                claims.iter().all(|claim| claim["verdict"] == "undecided" || claim["margin"].as_f64().unwrap() > 0.0)
+            );
         }
     }
 }
@@ -139,4 +141,41 @@ fn an_edited_design_is_refuted() {
         let ended = place.lpv("certify edited.json");
         assert_eq!(ended.code, 4, "{pointer}: {}{}", ended.out, ended.err);
     }
+}
+
+/// The thesis's printed K(ψ) is a design file like any other: refuted, with the eigenvalue and where it is.
+#[test]
+fn the_printed_gain_of_the_thesis_is_refuted() {
+    let place = Place::with("");
+    place.write("printed.json", include_str!("../../../../scenarios/thesis-printed-gain.json"));
+    let ended = place.lpv("certify printed.json --json");
+    ended.refuses(4, &["thesis-printed-gain", "refuted"]);
+    let certificate = parsed(&ended.out);
+    let claims = certificate["claims"].as_array().unwrap();
+    let stability = claims.iter().find(|claim| claim["claim"] == "frozen closed loop is stable").unwrap();
+    assert_eq!(stability["verdict"], "refuted");
+    assert!((stability["margin"].as_f64().unwrap() + 3.263).abs() < 1e-3);
+    assert!(stability["detail"].as_str().unwrap().contains("psi = 0.0000"));
+    for key in ["claim", "verdict", "margin", "cells", "seconds"] {
+        assert!(claims.iter().all(|claim| claim.get(key).is_some()), "{key}");
+    }
+    // at rest it is refuted by a proof with a witness
+    let ended = place.lpv("certify printed.json --rate 0 --json");
+    let certificate = parsed(&ended.out);
+    let refuted = |claim: &&Value| claim["verdict"] == "refuted" && claim.get("witness").is_some();
+    let claim = certificate["claims"].as_array().unwrap().iter().find(refuted).unwrap();
+    assert_eq!(claim["witness"]["state"].as_array().unwrap().len(), 12);
+    place.lpv("certify printed.json --rate=-1").refuses(2, &["--rate", "zero or more"]);
+    place.lpv("certify printed.json --region 0").refuses(2, &["--region", "above zero"]);
+}
+
+/// A design for another plant than the file's is no design.
+#[test]
+fn a_design_of_another_plant_is_refused() {
+    let place = Place::with(QUADROTOR);
+    place.succeed("design scenario.toml --out designs");
+    let mut design = place.json("designs/design-saturated.json");
+    design["plant"]["mass_kg"] = 2.5.into();
+    place.write("edited.json", design.to_string());
+    place.lpv("certify edited.json").refuses(2, &["model_hash", "another plant"]);
 }

@@ -1,8 +1,8 @@
 //! Checks a [`Design`] from the plant alone: the model is derived again, every inequality is computed anew from K and P,
 //! and the solver that made the design is not asked.
 //!
-//! A claim gets one of four verdicts ([`Verdict`]). Nothing here is a proof yet, so the best verdict given is `numerical`:
-//! the claim holds at the points that were checked, in floating point.
+//! A claim gets one of four verdicts ([`Verdict`]). [`check`] computes at points, in floating point, and its best verdict is
+//! `numerical`; [`prove`] proves over the whole range of the parameter.
 
 mod inequality;
 mod proof;

@@ -28,11 +28,13 @@ use std::time::Instant;
 const LEAST_HALF: f64 = 1.0 / 2048.0;
 const LEAST_HALF_OF_SEARCH: f64 = 1.0 / 1024.0;
 /// Halvings after which a cell takes the second derivatives of the one that it is part of.
-const OWN_DERIVATIVES: usize = 3;
+const OWN_DERIVATIVES: usize = 99;
 /// What the level of the certified set is multiplied by until it is proved: between grid points a little is lost.
 const LEVELS: [f64; 5] = [1.0, 0.999, 0.995, 0.98, 0.9];
 /// By this factor the cost bound of a frozen design may be exceeded when it is proved for a moving parameter.
 pub const COST_INFLATION: f64 = 1.1;
+/// The same of a design that was made for a moving parameter.
+pub const COST_INFLATION_RATE_BOUNDED: f64 = 1.01;
 /// Rates are found to this factor.
 const RATE_RATIO: f64 = 1.03;
 /// Rates outside are not sought.
@@ -48,6 +50,9 @@ struct Cell<M> {
 
 /// How a matrix is enclosed on a place, within the matrix of an outer cell if there is one.
 type Enclose<'a, M> = Box<dyn Fn(&Place, Option<&M>) -> M + Sync + 'a>;
+
+/// What is known of a cell's claims from its matrix and half-width, each with the rate that it is for.
+type Judgement<'j, M> = dyn Fn(&M, f64) -> Vec<(f64, Definiteness)> + Sync + 'j;
 
 /// Cells of every piece and of every variant of a claim (mixtures, inputs), refined as far as a claim ever needed.
 struct Cells<'a, M> {
@@ -92,8 +97,8 @@ impl<'a, M: Send + Sync> Cells<'a, M> {
         self.groups.iter().map(Vec::len).sum()
     }
 
-    /// Prove `claims` (each with the rate that it is for) of every cell, with cells of half-width at least `least`.
-    fn prove(&mut self, least: f64, claims: &(dyn Fn(&M, f64) -> Vec<(f64, Definiteness)> + Sync)) -> Attempt {
+    /// Prove `claims` of every cell, with cells of half-width at least `least`.
+    fn prove(&mut self, least: f64, claims: &Judgement<M>) -> Attempt {
         let enclose = &self.enclose;
         let of_group = |cells: &mut Vec<Cell<M>>| {
             let mut margin = f64::INFINITY;
@@ -153,6 +158,8 @@ pub struct ProofOptions {
 pub struct Proofs {
     /// The claims, in the order in which they build on each other.
     pub claims: Vec<Claim>,
+    /// Whether the rate was asked for, by the caller or by the design: then a claim that is not proved is a failure.
+    pub asked: bool,
     /// Largest rate of the parameter for which stability (and invariance of the set) is proved.
     pub stable_up_to: Option<f64>,
     /// Largest rate for which the cost bound is proved, inflated by `cost_factor`.
@@ -193,7 +200,11 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place, outer| closed_loop.decrease(place, outer));
     let own = design.rate_bounded.as_ref().map(|bounded| bounded.rate);
     let asked = if closed_loop.has_parameter { options.rate.or(own) } else { Some(0.0) };
-    let cost_factor = if own.is_some() || !closed_loop.has_parameter { 1.0 } else { COST_INFLATION };
+    let cost_factor = match (closed_loop.has_parameter, own) {
+        (false, _) => 1.0,
+        (true, Some(_)) => COST_INFLATION_RATE_BOUNDED,
+        (true, None) => COST_INFLATION,
+    };
     let what = match level {
         Some(level) => format!("the set x'P x <= {level} is invariant"),
         None => "x'P x decreases".into(),
@@ -216,10 +227,16 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         } else {
             format!(" for {} <= {rate:.4} {}", words.rate, words.unit)
         };
-        let claim = format!("{what}{motion}{}", words.every);
-        claims.push(words.claim(claim, attempt, &closed_loop, cells.len(), started));
+        let mut claim =
+            words.claim(format!("{what}{motion}{}", words.every), attempt, &closed_loop, cells.len(), started);
+        if asked.is_none() && claim.verdict == Verdict::Refuted {
+            // nobody claimed it: with the gain between the grid points this P is no bound even at rest, another may be
+            claim.verdict = Verdict::Undecided;
+            claim.detail = format!("no rate could be proved: {}", claim.detail);
+        }
+        claims.push(claim);
     }
-    Ok(Proofs { claims, stable_up_to: reached[0], cost_up_to: reached[1], cost_factor, level })
+    Ok(Proofs { claims, asked: asked.is_some(), stable_up_to: reached[0], cost_up_to: reached[1], cost_factor, level })
 }
 
 /// P(ρ) of the Lyapunov function that [`prove`] is about; `None` where there is none.

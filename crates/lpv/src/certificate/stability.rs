@@ -47,11 +47,16 @@ pub fn frozen_stability(design: &Design, plant: &dyn Plant, count: usize) -> Sta
     })
 }
 
-/// The worse of two, separately for abscissa and radius; NaN is the worst.
+/// The worse of two, separately for abscissa and radius; NaN is the worst. Of two that differ by rounding only, as all points
+/// of a symmetric plant do, the one nearer to parameter zero is named.
 fn worst(a: StabilityMargin, b: StabilityMargin) -> StabilityMargin {
-    let worse = |b: f64, a: f64| b.is_nan() || b > a;
-    let (abscissa, abscissa_at) =
-        if worse(b.abscissa, a.abscissa) { (b.abscissa, b.abscissa_at) } else { (a.abscissa, a.abscissa_at) };
-    let (radius, radius_at) = if worse(b.radius, a.radius) { (b.radius, b.radius_at) } else { (a.radius, a.radius_at) };
+    const SAME: f64 = 1e-9;
+    let of_two = |a: (f64, f64), b: (f64, f64)| {
+        let is_same = (a.0 - b.0).abs() <= SAME * a.0.abs();
+        let second = if is_same { b.1.abs() < a.1.abs() } else { b.0.is_nan() || b.0 > a.0 };
+        if second { b } else { a }
+    };
+    let (abscissa, abscissa_at) = of_two((a.abscissa, a.abscissa_at), (b.abscissa, b.abscissa_at));
+    let (radius, radius_at) = of_two((a.radius, a.radius_at), (b.radius, b.radius_at));
     StabilityMargin { abscissa, abscissa_at, radius, radius_at }
 }

@@ -79,6 +79,12 @@ impl Interval {
         Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
     }
 
+    /// 2x, exactly.
+    #[inline]
+    pub fn doubled(self) -> Self {
+        Self { lo: 2.0 * self.lo, hi: 2.0 * self.hi }
+    }
+
     /// x², which is not negative.
     pub fn square(self) -> Self {
         let square = self * self;
@@ -108,7 +114,14 @@ impl From<f64> for Interval {
 impl Add for Interval {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
+        if self.is_zero() {
+            return other;
+        }
+        if other.is_zero() {
+            return self;
+        }
         Self::outward(self.lo + other.lo, self.hi + other.hi)
     }
 }
@@ -116,7 +129,11 @@ impl Add for Interval {
 impl Sub for Interval {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
+        if other.is_zero() {
+            return self;
+        }
         Self::outward(self.lo - other.hi, self.hi - other.lo)
     }
 }
@@ -132,6 +149,7 @@ impl Neg for Interval {
 impl Mul for Interval {
     type Output = Self;
 
+    #[inline]
     fn mul(self, other: Self) -> Self {
         if self.is_zero() || other.is_zero() {
             // exactly zero, and rounded to nothing else; of an infinite end nothing is known

@@ -82,7 +82,7 @@ impl Mul for Taylor {
             value: self.value * other.value,
             slope: self.slope * other.value + self.value * other.slope,
             bend: (self.bend.zip(other.bend))
-                .map(|(f, g)| f * other.value + self.slope * other.slope * 2.0 + self.value * g),
+                .map(|(f, g)| f * other.value + (self.slope * other.slope).doubled() + self.value * g),
         }
     }
 }

@@ -51,6 +51,16 @@ pub enum PlantParameterError {
 }
 
 impl PlantSpec {
+    /// A fingerprint of the plant with its parameters: 16 hexadecimal digits, the same exactly for the same plant. Two plants
+    /// share one by chance only (FNV-1a, 64 bits, of the plant as JSON).
+    pub fn fingerprint(&self) -> String {
+        let text = serde_json::to_string(self).unwrap_or_default();
+        let hash = text
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+        format!("{hash:016x}")
+    }
+
     /// The plant.
     ///
     /// # Errors

@@ -96,6 +96,9 @@ pub struct Design {
     pub convention: String,
     /// The plant that it was made for.
     pub plant: PlantSpec,
+    /// [`PlantSpec::fingerprint`] of the plant when it was designed; a design from elsewhere may have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_hash: Option<String>,
     /// How it was made.
     pub method: Method,
     /// Cost weights.
@@ -210,6 +213,7 @@ pub(super) fn assemble(
         name: request.name.clone(),
         convention: "u = u* - sat(K(rho) (x - x_ref))".into(),
         plant: spec.clone(),
+        model_hash: Some(spec.fingerprint()),
         method: request.method,
         weights: request.weights.clone(),
         sample_time_s: request.sample_time_s,

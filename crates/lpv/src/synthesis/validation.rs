@@ -40,6 +40,11 @@ impl Design {
     /// The first thing that does not fit.
     pub fn validate(&self) -> Result<(), DesignError> {
         let plant = self.plant.build()?;
+        let fingerprint = self.plant.fingerprint();
+        if let Some(hash) = self.model_hash.as_ref().filter(|&hash| *hash != fingerprint) {
+            let found = format!("is {hash:?}, and the plant of the file has {fingerprint:?}");
+            return refuse("model_hash", found, "the same: the design was made for another plant");
+        }
         let description = plant.description();
         let (n, m) = (description.states.len(), description.inputs.len());
         let scheduling = description.scheduling.as_ref();

@@ -6,5 +6,6 @@ mod jacobians;
 mod layering;
 mod moving_parameter;
 mod polytopic;
+mod proofs;
 mod quadrotor;
 mod synthesis;

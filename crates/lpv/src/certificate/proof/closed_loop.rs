@@ -161,7 +161,7 @@ impl<'a> ClosedLoop<'a> {
         let (a, b) = self.plant.linearization_over(rho);
         let (a, b) = (TaylorMatrix::new(n, n, a), TaylorMatrix::new(n, m, b));
         let k = TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho));
-        let (q, r) = (TaylorMatrix::constant(&self.weights.q), TaylorMatrix::constant(&self.weights.r));
+        let CostWeights { q, r } = self.weights;
         let mixed = |k: TaylorMatrix, f: Option<TaylorMatrix>| match f {
             None => k,
             Some(f) => TaylorMatrix::from_fn(m, n, |i, j| if mixture >> i & 1 == 1 { k.at(i, j) } else { f.at(i, j) }),
@@ -172,13 +172,17 @@ impl<'a> ClosedLoop<'a> {
                 let (p_rate, p) = (self.derivative(p, rho), self.function(p, rho));
                 let s = mixed(k, auxiliary);
                 let flow = p.times(&b.times(&s).minus(&a));
-                [flow.plus(&flow.transpose()), p_rate.negated(), s.transpose().times(&r.times(&s)).plus(&q).negated()]
+                [
+                    flow.plus(&flow.transpose()),
+                    p_rate.negated(),
+                    s.quadratic(r).plus(&TaylorMatrix::constant(q)).negated(),
+                ]
             }
             Form::Inverse(y) => {
                 let (y_rate, y) = (self.derivative(y, rho), self.function(y, rho));
                 let sy = mixed(k.times(&y), auxiliary);
                 let flow = b.times(&sy).minus(&a.times(&y));
-                let cost = sy.transpose().times(&r.times(&sy)).plus(&y.times(&q.times(&y)));
+                let cost = sy.quadratic(r).plus(&y.quadratic(q));
                 [flow.plus(&flow.transpose()), y_rate, cost.negated()]
             }
         }

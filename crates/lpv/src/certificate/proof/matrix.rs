@@ -54,6 +54,27 @@ impl TaylorMatrix {
         product
     }
 
+    /// Mᵀ D M for a constant symmetric D, each entry of the symmetric product once.
+    pub fn quadratic(&self, weight: &Mat<f64>) -> Self {
+        let weighted = Self::from_fn(self.rows, self.columns, |i, j| {
+            let terms = (0..self.rows).filter(|&k| weight[(i, k)] != 0.0);
+            terms.fold(Taylor::from(0.0), |sum, k| sum + self.at(k, j) * weight[(i, k)])
+        });
+        let n = self.columns;
+        let mut product = Self::new(n, n, vec![Taylor::from(0.0); n * n]);
+        for i in 0..n {
+            for j in i..n {
+                let terms = (0..self.rows).map(|k| (self.at(k, i), weighted.at(k, j)));
+                let sum = terms
+                    .filter(|(a, b)| !a.is_zero() && !b.is_zero())
+                    .fold(Taylor::from(0.0), |sum, (a, b)| sum + a * b);
+                product.entries[i * n + j] = sum;
+                product.entries[j * n + i] = sum;
+            }
+        }
+        product
+    }
+
     pub fn transpose(&self) -> Self {
         Self::from_fn(self.columns, self.rows, |i, j| self.at(j, i))
     }
@@ -71,13 +92,13 @@ impl TaylorMatrix {
     }
 }
 
-/// M(t) ∈ value + (t − c) slope + ½(t − c)² [−bend, bend] on a cell, symmetric, n × n in row order.
+/// M(t) ∈ value + (t − c) slope + ½(t − c)² bend on a cell, symmetric, n × n in row order.
 #[derive(Clone, Debug)]
 pub(super) struct CellMatrix {
     n: usize,
     value: Vec<Interval>,
     slope: Vec<Interval>,
-    bend: Vec<f64>,
+    bend: Vec<Interval>,
 }
 
 /// What is known of a symmetric matrix on a cell.
@@ -104,16 +125,14 @@ impl CellMatrix {
         let half = |x: Interval| x * 0.5;
         let entry = |at: usize| (at / n, at % n);
         let symmetric = |of: &dyn Fn(usize, usize) -> Interval| -> Vec<Interval> {
-            (0..n * n).map(|at| entry(at)).map(|(i, j)| half(of(i, j) + of(j, i))).collect()
+            (0..n * n).map(entry).map(|(i, j)| half(of(i, j) + of(j, i))).collect()
         };
         Self {
             n,
             value: symmetric(&|i, j| middle.at(i, j).value),
             slope: symmetric(&|i, j| middle.at(i, j).slope),
             bend: match over {
-                Ok(over) => (symmetric(&|i, j| over.at(i, j).bend.unwrap_or(Interval::ENTIRE)).into_iter())
-                    .map(Interval::magnitude)
-                    .collect(),
+                Ok(over) => symmetric(&|i, j| over.at(i, j).bend.unwrap_or(Interval::ENTIRE)),
                 Err(outer) => outer.bend.clone(),
             },
         }
@@ -128,10 +147,7 @@ impl CellMatrix {
             };
             (0..n * n).map(at).collect()
         };
-        let bend = |at: usize| {
-            (terms.iter()).fold(Interval::point(0.0), |sum, (w, m)| sum + Interval::point(m.bend[at]) * w.abs()).hi()
-        };
-        Self { n, value: sum(&|m| &m.value), slope: sum(&|m| &m.slope), bend: (0..n * n).map(bend).collect() }
+        Self { n, value: sum(&|m| &m.value), slope: sum(&|m| &m.slope), bend: sum(&|m| &m.bend) }
     }
 
     /// Is −M, or M, positive definite for all |t − c| ≤ `half`?
@@ -146,7 +162,7 @@ impl CellMatrix {
         let factor = |i: usize, j: usize| inverse[(i, j)];
         let value = congruence(n, &factor, &self.value);
         let slope = congruence(n, &factor, &self.slope);
-        let bend = absolute_congruence(n, &factor, &self.bend);
+        let bend = congruence(n, &factor, &self.bend);
         let half = Interval::point(half);
         let excess = |i: usize| {
             (0..n).fold(Interval::point(0.0), |sum, j| {
@@ -154,7 +170,7 @@ impl CellMatrix {
                 let identity = if i == j { 1.0 } else { 0.0 };
                 let constant = Interval::point((value[at] - identity).magnitude());
                 let linear = half * slope[at].magnitude();
-                let quadratic = half.square() * 0.5 * bend[at];
+                let quadratic = half.square() * 0.5 * bend[at].magnitude();
                 sum + constant + linear + quadratic
             })
         };
@@ -165,10 +181,9 @@ impl CellMatrix {
     /// zᵀM(c)z for the eigenvector z of the smallest eigenvalue, in interval arithmetic.
     fn refutation(&self, middle: &Mat<f64>) -> Definiteness {
         let n = self.n;
-        if !(smallest_eigenvalue(middle) < 0.0) {
+        let Some(direction) = smallest_eigenvector(middle).filter(|_| smallest_eigenvalue(middle) < 0.0) else {
             return Definiteness::Open;
-        }
-        let Some(direction) = smallest_eigenvector(middle) else { return Definiteness::Open };
+        };
         let form = (0..n * n).fold(Interval::point(0.0), |sum, at| {
             sum + self.value[at] * (Interval::point(direction[at / n]) * direction[at % n])
         });
@@ -199,10 +214,4 @@ fn congruence(n: usize, factor: &dyn Fn(usize, usize) -> f64, matrix: &[Interval
         }
     }
     both
-}
-
-/// Upper bounds of the entries of |F| B |F|ᵀ for B ≥ 0.
-fn absolute_congruence(n: usize, factor: &dyn Fn(usize, usize) -> f64, bend: &[f64]) -> Vec<f64> {
-    let bend: Vec<Interval> = bend.iter().map(|&b| Interval::point(b)).collect();
-    congruence(n, &|i, j| factor(i, j).abs(), &bend).into_iter().map(Interval::hi).collect()
 }

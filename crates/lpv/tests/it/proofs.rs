@@ -1,0 +1,228 @@
+//! What is proved stays true under exact arithmetic and random sampling, and what is false is never proved.
+
+use crate::quadrotor::{limits, plant, spec, weights};
+use lpv::certificate::{Claim, ProofOptions, Verdict, lyapunov_matrix, prove};
+use lpv::controller::{InputLimits, Schedule};
+use lpv::math::Mat;
+use lpv::math::matrix::{diagonal, quadratic_form};
+use lpv::model::{MatrixFunction, linearize};
+use lpv::plant::{LinearParameters, PlantSpec};
+use lpv::synthesis::{CostWeights, Design, DesignRequest, Method, RateBoundedOptions, ScheduleKind, design};
+
+/// A stream of numbers in (−1, 1) from a seed.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((self.0 >> 33) as f64) / f64::from(1_u32 << 30) - 1.0
+    }
+}
+
+fn claim<'a>(claims: &'a [Claim], words: &str) -> &'a Claim {
+    claims
+        .iter()
+        .find(|claim| claim.claim.contains(words))
+        .unwrap_or_else(|| panic!("no claim about {words}: {claims:?}"))
+}
+
+/// Units in which all numbers of the mutation test are integers.
+const UNIT: f64 = 1024.0;
+
+fn integers(matrix: &Mat<f64>) -> [[i128; 2]; 2] {
+    [0, 1].map(|i| [0, 1].map(|j| (matrix[(i, j)] * UNIT) as i128))
+}
+
+/// Whether −(P(A − bk) + (A − bk)ᵀP) − weight·(Q + kᵀrk) ≻ 0 exactly, in integers over 2³⁰.
+fn exactly_decreases(a: &Mat<f64>, p: &Mat<f64>, k: &Mat<f64>, cost: Option<(&Mat<f64>, f64)>) -> bool {
+    let unit = UNIT as i128;
+    let (a, p) = (integers(a), integers(p));
+    let k = [0, 1].map(|j| (k[(0, j)] * UNIT) as i128);
+    // b = (0, 1)ᵀ
+    let closed = [a[0], [a[1][0] - k[0], a[1][1] - k[1]]];
+    let flow = |i: usize, j: usize| (0..2).map(|l| p[i][l] * closed[l][j]).sum::<i128>() * unit;
+    let q = cost.map(|(q, r)| (integers(q), (r * UNIT) as i128));
+    let n = [0, 1].map(|i| {
+        [0, 1].map(|j| {
+            let stage = q.map_or(0, |(q, r)| q[i][j] * unit * unit + k[i] * k[j] * r);
+            -flow(i, j) - flow(j, i) - stage
+        })
+    });
+    n[0][0] > 0 && n[0][0] * n[1][1] - n[0][1] * n[1][0] > 0
+}
+
+fn rounded(matrix: &Mat<f64>) -> Mat<f64> {
+    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| (matrix[(i, j)] * UNIT).round() / UNIT)
+}
+
+/// Thousands of designs, perturbed from grossly to next to nothing: none is proved that exact arithmetic refutes.
+#[test]
+fn no_mutation_that_is_false_is_proved() {
+    let mut numbers = Numbers(7);
+    let (mut proved, mut false_ones) = (0, 0);
+    for case in 0..4000 {
+        let a = rounded(&Mat::from_fn(2, 2, |_, _| 2.0 * numbers.next()));
+        let spec = PlantSpec::Linear(LinearParameters {
+            a: (0..2).map(|i| (0..2).map(|j| a[(i, j)]).collect()).collect(),
+            b: vec![vec![0.0], vec![1.0]],
+            c: None,
+        });
+        let plant = spec.build().unwrap();
+        let size = 2.0_f64.powi(-(case % 10));
+        let closed = Mat::from_fn(2, 2, |i, j| if i == j { 1.5 } else { 0.25 * numbers.next() });
+        let p = rounded(&Mat::from_fn(2, 2, |i, j| {
+            let symmetric = if i <= j { closed[(i, j)] } else { closed[(j, i)] };
+            symmetric + if i == j { size * numbers.next().abs() } else { 0.0 }
+        }));
+        let p = Mat::from_fn(2, 2, |i, j| if i <= j { p[(i, j)] } else { p[(j, i)] });
+        let k = rounded(&Mat::from_fn(1, 2, |_, j| a[(1, j)] + 1.0 + j as f64 + 2.0 * size * numbers.next()));
+        let weights = CostWeights { q: rounded(&diagonal(&[0.125, 0.25])), r: diagonal(&[0.0625]) };
+        let design = Design {
+            name: "mutant".into(),
+            convention: String::new(),
+            plant: spec,
+            model_hash: None,
+            method: Method::Lpvqr,
+            weights: weights.clone(),
+            sample_time_s: 0.01,
+            controller: lpv::controller::Controller {
+                schedule: Schedule::Constant { gain: k.clone() },
+                scheduling_state: None,
+                limits: InputLimits::none(1),
+                operating_input: vec![0.0],
+            },
+            schedule_error: 0.0,
+            back_off: 0.0,
+            points: vec![lpv::synthesis::FrozenDesign {
+                rho: 0.0,
+                gain: k.clone(),
+                auxiliary_gain: None,
+                trace_y: 0.0,
+                p: p.clone(),
+                riccati_difference: None,
+                iterations: 0,
+            }],
+            rate_bounded: None,
+        };
+        let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
+        for (words, cost) in [("decreases", None), ("the cost", Some((&weights.q, 0.0625)))] {
+            let verdict = claim(&proofs.claims, words).verdict;
+            let truth = exactly_decreases(&a, &p, &k, cost);
+            assert!(truth || verdict != Verdict::Proved, "case {case}: {words} is false and proved");
+            assert!(!truth || verdict != Verdict::Refuted, "case {case}: {words} is true and refuted");
+            proved += usize::from(verdict == Verdict::Proved);
+            false_ones += usize::from(!truth);
+        }
+    }
+    assert!(proved > 500 && false_ones > 500, "{proved} proved, {false_ones} false: the test tests something");
+}
+
+/// A bit beyond the edge is refuted, a bit inside proved: ẋ = −x/2 + u with k = 0.5 has 2P(−1) + Q + 0.25 R = 0 at P = 0.75.
+#[test]
+fn the_edge_is_found() {
+    let spec = PlantSpec::Linear(LinearParameters { a: vec![vec![-0.5]], b: vec![vec![1.0]], c: None });
+    let plant = spec.build().unwrap();
+    let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+    let weights = CostWeights { q: scalar(1.25), r: scalar(1.0) };
+    for (p, expected) in
+        [(0.75 * (1.0 + 1e-13), Verdict::Proved), (0.75 * (1.0 - 1e-13), Verdict::Refuted), (0.75, Verdict::Undecided)]
+    {
+        let request = DesignRequest {
+            name: "edge".into(),
+            method: Method::Lpvqr,
+            weights: weights.clone(),
+            grid_points: 1,
+            schedule: ScheduleKind::Grid,
+            limits: InputLimits::none(1),
+            sample_time_s: 0.01,
+            rate_bounded: None,
+        };
+        let mut design = design(&spec, &*plant, &request, &|_| {}).unwrap();
+        design.points[0].p = scalar(p);
+        design.controller.schedule = Schedule::Constant { gain: scalar(0.5) };
+        let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
+        assert_eq!(claim(&proofs.claims, "the cost").verdict, expected, "P = {p}");
+    }
+}
+
+/// The largest proved rates of the frozen designs, against a computation in coordinates that rotate with the vehicle:
+/// 76.1 rad/s and 0.38 rad/s.
+#[test]
+fn rates_of_the_frozen_designs() {
+    let plant = plant();
+    for (method, limits, expected) in
+        [(Method::Lpvqr, InputLimits::none(4), 76.1), (Method::Slpvqr { gamma: 1.0 }, limits(), 0.38)]
+    {
+        let design = crate::quadrotor::designed(method, limits, 32, ScheduleKind::Grid);
+        let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
+        let rate = proofs.stable_up_to.unwrap();
+        assert!((0.9 * expected..1.005 * expected).contains(&rate), "{rate} is not {expected}");
+        // beyond it there is a motion along which V grows
+        let beyond = prove(&design, &*plant, &ProofOptions { rate: Some(1.2 * expected), level: None }).unwrap();
+        let claim = beyond.claims.iter().find(|claim| claim.verdict == Verdict::Refuted).unwrap();
+        let witness = claim.witness.as_ref().unwrap();
+        assert!(witness.value < 0.0 && witness.state.len() == 12 && witness.rate.abs() > expected);
+    }
+}
+
+/// The full circle at ±2 rad/s, and then random yaws, rates and states: V falls by the cost, and the input stays unsaturated
+/// in the set.
+#[test]
+fn a_design_for_a_rate_is_proved_and_samples_agree() {
+    let plant = plant();
+    let mut direction = vec![0.0; 12];
+    direction[3] = 1.0;
+    let request = DesignRequest {
+        name: "proved".into(),
+        method: Method::Slpvqr { gamma: 1.0 },
+        weights: weights(),
+        grid_points: 32,
+        schedule: ScheduleKind::Grid,
+        limits: limits(),
+        sample_time_s: 0.002,
+        rate_bounded: Some(RateBoundedOptions { rate: 2.0, order: 2, direction: Some(direction) }),
+    };
+    let design = design(&spec(9.807), &*plant, &request, &|_| {}).unwrap();
+    let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
+    assert!(proofs.claims.iter().all(|claim| claim.verdict == Verdict::Proved), "{:?}", proofs.claims);
+    assert_eq!((proofs.stable_up_to, proofs.cost_up_to, proofs.level), (Some(2.0), Some(2.0), Some(1.0)));
+    let range = (1.0 / lyapunov_matrix(&design, &*plant, 0.0).unwrap()[(3, 3)]).sqrt();
+    assert!(range > 0.97 * 0.6671, "{range}");
+
+    let y = &design.rate_bounded.as_ref().unwrap().y;
+    let mut numbers = Numbers(3);
+    for _ in 0..2000 {
+        let (rho, rate) = (3.2 * numbers.next(), 2.0 * numbers.next());
+        let p = lyapunov_matrix(&design, &*plant, rho).unwrap();
+        let p_rate = -1.0 * (&p * (rate * y.derivative(&[rho], 0)) * &p);
+        let model = linearize(&*plant, rho);
+        let k = design.controller.schedule.gain_matrix(rho);
+        let flow = &p * (&model.a - &model.b * &k);
+        let stage = &design.weights.q + k.transpose() * &design.weights.r * &k;
+        let change = proofs.cost_factor * (&flow + flow.transpose() + &p_rate) + &stage;
+        for _ in 0..50 {
+            let mut x: Vec<f64> = (0..12).map(|_| numbers.next()).collect();
+            assert!(quadratic_form(&change, &x) < 0.0, "yaw {rho}, rate {rate}, {x:?}");
+            let scale = (1.0 / quadratic_form(&p, &x)).sqrt();
+            x.iter_mut().for_each(|value| *value *= scale);
+            for i in 0..4 {
+                let input: f64 = (0..12).map(|j| k[(i, j)] * x[j]).sum();
+                assert!(input.abs() <= 9.807 / 2.0, "yaw {rho}, input {i}: {input}");
+            }
+        }
+    }
+}
+
+/// The matrix function of a frozen design is what the proof is about: it interpolates the points.
+#[test]
+fn the_lyapunov_function_interpolates_the_design() {
+    let design = crate::quadrotor::designed(Method::Lpvqr, InputLimits::none(4), 16, ScheduleKind::Grid);
+    let plant = plant();
+    for point in &design.points {
+        let p = lyapunov_matrix(&design, &*plant, point.rho).unwrap();
+        assert!((&p - &point.p).norm_max() < 1e-9 * point.p.norm_max());
+    }
+    let samples: Vec<Mat<f64>> = design.points.iter().map(|point| point.p.clone()).collect();
+    // the frozen P of this plant turns with the yaw: harmonics up to two, and no more
+    assert!(MatrixFunction::trigonometric(design.points[0].rho, &samples, 1e-9).basis.len() <= 5);
+}
