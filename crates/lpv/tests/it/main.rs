@@ -1,6 +1,7 @@
 //! Integration tests of the library: the mathematics against the thesis, closed forms and residuals.
 
 mod closed_loop;
+mod costs;
 mod filter;
 mod jacobians;
 mod layering;
