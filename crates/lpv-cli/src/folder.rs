@@ -157,7 +157,10 @@ impl ResultFile {
 /// Whether a file of this name is one that this program writes.
 fn is_result(name: &str) -> bool {
     let is = |start: &str, end: &str| name.starts_with(start) && name.ends_with(end);
-    ["run.json", "report.html", "model.json"].contains(&name) || is("design-", ".json") || is("trajectory-", ".csv")
+    ["run.json", "report.html", "model.json", "tables.json"].contains(&name)
+        || is("design-", ".json")
+        || is("trajectory-", ".csv")
+        || is("figure-", ".svg")
 }
 
 impl Drop for ResultFolder {

@@ -8,6 +8,7 @@ mod certify;
 mod design;
 mod designs;
 mod failure;
+mod figure;
 mod flights;
 mod folder;
 mod output;
@@ -20,6 +21,7 @@ mod scenario;
 mod sdp;
 mod simulate;
 mod table;
+mod thesis;
 
 use clap::{Parser, Subcommand};
 use std::io::Write;
@@ -45,6 +47,8 @@ enum Command {
     Certify(certify::CertifyArguments),
     /// Fly saved designs through a scenario
     Simulate(simulate::SimulateArguments),
+    /// Recompute every table and figure of the thesis, in one report
+    Thesis(thesis::ThesisArguments),
     /// Solve a semidefinite program from an SDPA sparse file
     Sdp(sdp::SdpArguments),
 }
@@ -55,6 +59,7 @@ fn main() -> ExitCode {
         Command::Design(arguments) => design::run(&arguments),
         Command::Certify(arguments) => certify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Thesis(arguments) => thesis::run(&arguments),
         Command::Sdp(arguments) => sdp::run(&arguments),
     };
     match outcome {

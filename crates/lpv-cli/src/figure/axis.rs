@@ -1,0 +1,75 @@
+//! Axes: ranges, round ticks, numbers.
+
+/// An axis with its label, unit included.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// For example `x_1 / rad`; `_1` is set as an index.
+    pub label: String,
+    /// Ends; found from the data where not given.
+    pub range: Option<[f64; 2]>,
+}
+
+impl Axis {
+    /// An axis that spans its data.
+    pub fn new(label: impl Into<String>) -> Self {
+        Self { label: label.into(), range: None }
+    }
+
+    /// An axis from `low` to `high`.
+    pub fn over(label: impl Into<String>, low: f64, high: f64) -> Self {
+        Self { label: label.into(), range: Some([low, high]) }
+    }
+}
+
+/// Round values in `range`, about `count` of them: multiples of 1, 2 or 5 times a power of ten.
+pub(super) fn ticks([low, high]: [f64; 2], count: usize) -> Vec<f64> {
+    let rough = (high - low) / count.max(1) as f64;
+    let power = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * power).find(|step| *step >= rough * 0.999);
+    let step = step.unwrap_or(10.0 * power);
+    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+    (first..=last).map(|k| k as f64 * step).collect()
+}
+
+/// The numbers of `ticks`, all with the decimals that their distance asks for.
+pub(super) fn tick_labels(ticks: &[f64]) -> Vec<String> {
+    let step = if ticks.len() > 1 { ticks[1] - ticks[0] } else { 1.0 };
+    let largest = ticks.iter().fold(0.0f64, |largest, tick| largest.max(tick.abs()));
+    if largest >= 1e5 || (step < 1e-4 && step > 0.0) {
+        return ticks.iter().map(|tick| if *tick == 0.0 { "0".into() } else { format!("{tick:.1e}") }).collect();
+    }
+    let decimals = (-step.log10() - 1e-9).ceil().max(0.0) as usize;
+    let typographic = |number: String| number.replace('-', "−");
+    ticks.iter().map(|tick| typographic(format!("{:.decimals$}", tick + 0.0))).collect()
+}
+
+/// The range of `values` with room at both ends.
+pub(super) fn span(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let (low, high) = values
+        .filter(|value| value.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return [0.0, 1.0];
+    }
+    let room = if high > low { 0.06 * (high - low) } else { 0.5 * low.abs().max(1.0) };
+    [low - room, high + room]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(ticks([-0.2, 1.05], 5), [0.0, 0.5, 1.0]);
+        assert_eq!(tick_labels(&ticks([-0.2, 1.05], 5)), ["0.0", "0.5", "1.0"]);
+        assert_eq!(tick_labels(&ticks([-3.0, 3.0], 4)), ["−2", "0", "2"]);
+        assert_eq!(ticks([0.0, 60.0], 6), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
+    }
+
+    #[test]
+    fn constant_data_has_a_range() {
+        assert_eq!(span([2.0, 2.0].into_iter()), [1.0, 3.0]);
+        assert_eq!(span(std::iter::empty()), [0.0, 1.0]);
+    }
+}
