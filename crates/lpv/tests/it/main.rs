@@ -9,3 +9,4 @@ mod polytopic;
 mod proofs;
 mod quadrotor;
 mod synthesis;
+mod tensor_product;

@@ -1,0 +1,96 @@
+//! Models of the literature of tensor-product control, as matrix-valued functions S(ρ) = [A(ρ) B(ρ)] of their parameters.
+//! They share tests, examples and documentation.
+
+mod nata;
+mod pendulum_cart;
+mod tora;
+
+pub use nata::NataParameters;
+pub use pendulum_cart::PendulumCartParameters;
+pub use tora::ToraParameters;
+
+use crate::math::Mat;
+use crate::plant::Signal;
+use serde::{Deserialize, Serialize};
+
+/// A model by name, with its constants.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "name", rename_all = "kebab-case")]
+pub enum LiteratureModel {
+    /// Translational oscillator with a rotational actuator.
+    Tora(ToraParameters),
+    /// Prototypical aeroelastic wing section.
+    Nata(NataParameters),
+    /// Inverted pendulum on a cart.
+    PendulumCart(PendulumCartParameters),
+}
+
+/// A scheduling parameter with the range and grid that its source uses.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LiteratureParameter {
+    /// Symbol.
+    pub name: &'static str,
+    /// Unit; `1` for a number.
+    pub unit: &'static str,
+    /// Least and largest value.
+    pub range: [f64; 2],
+    /// Grid points.
+    pub grid_points: usize,
+}
+
+impl LiteratureModel {
+    /// The names in files, each with the model of the source's constants.
+    pub fn all() -> [(&'static str, Self); 3] {
+        [
+            ("tora", Self::Tora(ToraParameters::default())),
+            ("nata", Self::Nata(NataParameters::default())),
+            ("pendulum-cart", Self::PendulumCart(PendulumCartParameters::default())),
+        ]
+    }
+
+    /// The model called `name`, with the constants of its source.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::all().into_iter().find(|(known, _)| *known == name).map(|(_, model)| model)
+    }
+
+    /// Where model and constants are from.
+    pub fn source(&self) -> &'static str {
+        match self {
+            Self::Tora(_) => tora::SOURCE,
+            Self::Nata(_) => nata::SOURCE,
+            Self::PendulumCart(_) => pendulum_cart::SOURCE,
+        }
+    }
+
+    /// The scheduling parameters ρ.
+    pub fn parameters(&self) -> Vec<LiteratureParameter> {
+        match self {
+            Self::Tora(_) => tora::parameters(),
+            Self::Nata(_) => nata::parameters(),
+            Self::PendulumCart(_) => pendulum_cart::parameters(),
+        }
+    }
+
+    /// The state x; the columns of S(ρ) after its components belong to the inputs.
+    pub fn states(&self) -> Vec<Signal> {
+        match self {
+            Self::Tora(_) => Signal::list(&[("x_1", "1"), ("x_2", "1"), ("theta", "rad"), ("theta_dot", "1")]),
+            Self::Nata(_) => Signal::list(&[("h", "m"), ("alpha", "rad"), ("h_dot", "m/s"), ("alpha_dot", "rad/s")]),
+            Self::PendulumCart(_) => {
+                Signal::list(&[("r", "m"), ("theta", "rad"), ("r_dot", "m/s"), ("theta_dot", "rad/s")])
+            }
+        }
+    }
+
+    /// S(ρ) = [A(ρ) B(ρ)], n × (n + m).
+    ///
+    /// # Panics
+    /// If `rho` has fewer components than [`parameters`](Self::parameters).
+    pub fn at(&self, rho: &[f64]) -> Mat<f64> {
+        match self {
+            Self::Tora(constants) => constants.at(rho),
+            Self::Nata(constants) => constants.at(rho),
+            Self::PendulumCart(constants) => constants.at(rho),
+        }
+    }
+}
