@@ -1,7 +1,7 @@
 //! The program `lpv`: from a nonlinear plant to a checked gain-scheduled controller and its flight.
 //!
 //! Each subcommand is a file; what several share is beside them:
-//! `scenario` and `problem` read TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
+//! `scenario`, `problem` and `tp` read TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
 //! `table` lays them out, `output` prints, `folder` keeps results whole, `failure` is every way to end that is not success.
 
 mod certify;
@@ -20,6 +20,7 @@ mod scenario;
 mod sdp;
 mod simulate;
 mod table;
+mod tp;
 
 use clap::{Parser, Subcommand};
 use std::io::Write;
@@ -47,6 +48,8 @@ enum Command {
     Simulate(simulate::SimulateArguments),
     /// Solve a semidefinite program from an SDPA sparse file
     Sdp(sdp::SdpArguments),
+    /// Transform an LPV model to tensor-product form
+    Tp(tp::TpArguments),
 }
 
 fn main() -> ExitCode {
@@ -56,6 +59,7 @@ fn main() -> ExitCode {
         Command::Certify(arguments) => certify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Sdp(arguments) => sdp::run(&arguments),
+        Command::Tp(arguments) => tp::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -6,3 +6,4 @@ mod program;
 mod run;
 mod sdp;
 mod stages;
+mod transformation;

@@ -25,6 +25,33 @@ pub enum LiteratureModel {
     PendulumCart(PendulumCartParameters),
 }
 
+/// A constant that makes no model.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{constant} is {value}: {allowed}")]
+pub struct ConstantError {
+    /// Which.
+    pub constant: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// What is allowed.
+    pub allowed: &'static str,
+}
+
+impl ConstantError {
+    fn unless(holds: bool, constant: &'static str, value: f64, allowed: &'static str) -> Result<(), Self> {
+        if holds { Ok(()) } else { Err(Self { constant, value, allowed }) }
+    }
+
+    fn unless_positive(constant: &'static str, value: f64) -> Result<(), Self> {
+        let holds = value.is_finite() && value > 0.0;
+        Self::unless(holds, constant, value, "it has to be a positive, finite number")
+    }
+
+    fn unless_finite(constant: &'static str, value: f64) -> Result<(), Self> {
+        Self::unless(value.is_finite(), constant, value, "it has to be finite")
+    }
+}
+
 /// A scheduling parameter with the range and grid that its source uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LiteratureParameter {
@@ -51,6 +78,23 @@ impl LiteratureModel {
     /// The model called `name`, with the constants of its source.
     pub fn named(name: &str) -> Option<Self> {
         Self::all().into_iter().find(|(known, _)| *known == name).map(|(_, model)| model)
+    }
+
+    /// Whether this is the model called `name`.
+    pub fn is(&self, name: &str) -> bool {
+        Self::named(name).is_some_and(|known| std::mem::discriminant(&known) == std::mem::discriminant(self))
+    }
+
+    /// Whether the constants make a model.
+    ///
+    /// # Errors
+    /// A constant that is out of its range.
+    pub fn check(&self) -> Result<(), ConstantError> {
+        match self {
+            Self::Tora(constants) => constants.check(),
+            Self::Nata(constants) => constants.check(),
+            Self::PendulumCart(constants) => constants.check(),
+        }
     }
 
     /// Where model and constants are from.

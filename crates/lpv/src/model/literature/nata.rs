@@ -4,7 +4,7 @@
 //! [m, m x_α b; m x_α b, I_α] [ḧ; α̈] + [c_h ḣ; c_α α̇] + [k_h h; k_α(α) α] = [−L; M],
 //! L = ρU²b (c_lα e + c_lβ β), M = ρU²b² (c_mα e + c_mβ β), e = α + ḣ/U + (½ − a) b α̇/U.
 
-use super::LiteratureParameter;
+use super::{ConstantError, LiteratureParameter};
 use crate::math::Mat;
 use crate::math::matrix::from_rows;
 use serde::{Deserialize, Serialize};
@@ -74,10 +74,36 @@ pub fn parameters() -> Vec<LiteratureParameter> {
 }
 
 impl NataParameters {
+    /// m x_α b, the static moment about the elastic axis in kg m.
+    fn static_moment(&self) -> f64 {
+        self.mass_kg * (self.mass_centre_m - (1.0 + self.elastic_axis) * self.semichord_m)
+    }
+
+    pub(super) fn check(&self) -> Result<(), ConstantError> {
+        ConstantError::unless_positive("mass_kg", self.mass_kg)?;
+        ConstantError::unless_positive("inertia_kg_m2", self.inertia_kg_m2)?;
+        ConstantError::unless_positive("semichord_m", self.semichord_m)?;
+        ConstantError::unless_positive("air_density_kg_per_m3", self.air_density_kg_per_m3)?;
+        ConstantError::unless_finite("elastic_axis", self.elastic_axis)?;
+        ConstantError::unless_finite("mass_centre_m", self.mass_centre_m)?;
+        ConstantError::unless_finite("plunge_stiffness_n_per_m", self.plunge_stiffness_n_per_m)?;
+        ConstantError::unless_finite("plunge_damping_n_s_per_m", self.plunge_damping_n_s_per_m)?;
+        ConstantError::unless_finite("pitch_damping_n_m_s", self.pitch_damping_n_m_s)?;
+        ConstantError::unless_finite("lift_slope", self.lift_slope)?;
+        ConstantError::unless_finite("flap_lift_slope", self.flap_lift_slope)?;
+        ConstantError::unless_finite("flap_moment_slope", self.flap_moment_slope)?;
+        for coefficient in self.pitch_stiffness_n_m {
+            ConstantError::unless_finite("pitch_stiffness_n_m", coefficient)?;
+        }
+        let holds = self.mass_kg * self.inertia_kg_m2 > self.static_moment().powi(2);
+        let allowed = "it has to exceed (static moment)²/mass, or the mass matrix is not positive definite";
+        ConstantError::unless(holds, "inertia_kg_m2", self.inertia_kg_m2, allowed)
+    }
+
     /// S at ρ = (U, α), state (h, α, ḣ, α̇), input β.
     pub fn at(&self, rho: &[f64]) -> Mat<f64> {
         let (speed, pitch, b) = (rho[0], rho[1], self.semichord_m);
-        let static_moment = self.mass_kg * (self.mass_centre_m - (1.0 + self.elastic_axis) * b);
+        let static_moment = self.static_moment();
         let determinant = self.mass_kg * self.inertia_kg_m2 - static_moment * static_moment;
         let stiffness = self.pitch_stiffness_n_m.iter().rev().fold(0.0, |value, k| value * pitch + k);
         let moment_slope = (0.5 + self.elastic_axis) * self.lift_slope;

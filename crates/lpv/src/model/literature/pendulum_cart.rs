@@ -2,7 +2,7 @@
 //!
 //! (M + m) r̈ + m l (θ̈ cos θ − θ̇² sin θ) = u and (4/3) l θ̈ + r̈ cos θ = g sin θ.
 
-use super::LiteratureParameter;
+use super::{ConstantError, LiteratureParameter};
 use crate::math::Mat;
 use crate::math::matrix::from_rows;
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,13 @@ pub fn parameters() -> Vec<LiteratureParameter> {
 }
 
 impl PendulumCartParameters {
+    pub(super) fn check(&self) -> Result<(), ConstantError> {
+        ConstantError::unless_positive("cart_mass_kg", self.cart_mass_kg)?;
+        ConstantError::unless_positive("pole_mass_kg", self.pole_mass_kg)?;
+        ConstantError::unless_positive("half_length_m", self.half_length_m)?;
+        ConstantError::unless_finite("gravity_m_per_s2", self.gravity_m_per_s2)
+    }
+
     /// S at ρ = (θ, θ̇), state (r, θ, ṙ, θ̇), input u. sin θ = (sin θ/θ) θ and θ̇² sin θ = (θ̇ sin θ) θ̇.
     pub fn at(&self, rho: &[f64]) -> Mat<f64> {
         let (sin, cos) = rho[0].sin_cos();

@@ -2,7 +2,7 @@
 //!
 //! ẍ₁ + x₁ = ε(θ̇² sin θ − θ̈ cos θ) and θ̈ + ε ẍ₁ cos θ = u.
 
-use super::LiteratureParameter;
+use super::{ConstantError, LiteratureParameter};
 use crate::math::Mat;
 use crate::math::matrix::from_rows;
 use serde::{Deserialize, Serialize};
@@ -33,6 +33,11 @@ pub fn parameters() -> Vec<LiteratureParameter> {
 }
 
 impl ToraParameters {
+    pub(super) fn check(&self) -> Result<(), ConstantError> {
+        let holds = self.coupling > 0.0 && self.coupling < 1.0;
+        ConstantError::unless(holds, "coupling", self.coupling, "it has to lie between 0 and 1")
+    }
+
     /// S at ρ = (θ, θ̇), state (x₁, ẋ₁, θ, θ̇).
     pub fn at(&self, rho: &[f64]) -> Mat<f64> {
         let (sin, cos) = rho[0].sin_cos();
