@@ -11,6 +11,8 @@ pub struct ModeDecomposition {
     pub singular_values: Vec<f64>,
     /// U, Iₙ × min(Iₙ, columns), orthonormal columns; each has its entry of largest magnitude positive.
     pub left: Mat<f64>,
+    /// V, columns × min(Iₙ, columns), orthonormal columns.
+    pub right: Mat<f64>,
 }
 
 /// The decomposition of the unfolding in `mode` (from 0); `None` if it does not converge (entries that are not finite).
@@ -30,7 +32,8 @@ pub fn decompose_mode(tensor: &Tensor, mode: usize) -> Option<ModeDecomposition>
     };
     let signs: Vec<f64> = (0..count).map(sign).collect();
     let left = Mat::from_fn(vectors.nrows(), count, |i, k| signs[k] * vectors[(i, k)]);
-    singular_values.iter().all(|value| value.is_finite()).then_some(ModeDecomposition { singular_values, left })
+    let right = Mat::from_fn(unfolding.nrows(), count, |i, k| signs[k] * svd.U()[(i, k)]);
+    singular_values.iter().all(|value| value.is_finite()).then_some(ModeDecomposition { singular_values, left, right })
 }
 
 /// The one of larger magnitude; of two that differ by rounding only, the first.

@@ -207,7 +207,7 @@ impl TensorProductModel {
                 decomposition.singular_values[rank..].iter().map(|value| (value / norm).powi(2)).sum::<f64>();
             let left = Mat::from_fn(parameter.points.len(), rank, |i, j| decomposition.left[(i, j)]);
             let coordinates = Coordinates::of(&left, discarded.sqrt()).ok_or_else(not_converged)?;
-            projections.push(Projection::of(samples, n, &left, &decomposition.singular_values, &coordinates));
+            projections.push(Projection::of(&decomposition, &coordinates));
             let points = coordinates.points;
             let functions = WeightFunctions::new(parameter.clone(), *rule_of(&options.weightings, n), points)?;
             let project = orthogonal(&functions.points);
@@ -310,10 +310,12 @@ impl TensorProductModel {
 }
 
 impl Projection {
-    /// The unfolding is F₍ₙ₎ = UΣVᵀ, so a slice s of it has u = sVΣ⁻¹ with VΣ⁻¹ = F₍ₙ₎ᵀUΣ⁻²; then to y.
-    fn of(samples: &Tensor, mode: usize, left: &Mat<f64>, singular_values: &[f64], coordinates: &Coordinates) -> Self {
-        let scaled = Mat::from_fn(left.nrows(), left.ncols(), |i, j| left[(i, j)] / singular_values[j].powi(2));
-        let map = samples.unfolding_transposed(mode) * scaled * &coordinates.axes;
+    /// The unfolding is F₍ₙ₎ = UΣVᵀ, so a slice s of it has u = sVΣ⁻¹; then to y.
+    fn of(decomposition: &ModeDecomposition, coordinates: &Coordinates) -> Self {
+        // V itself: F₍ₙ₎ᵀUΣ⁻² is the same, but loses digits with the square of σ₁/σ_r
+        let (axes, singular_values) = (&coordinates.axes, &decomposition.singular_values);
+        let scaled = Mat::from_fn(axes.nrows(), axes.ncols(), |i, j| axes[(i, j)] / singular_values[i]);
+        let map = decomposition.right.subcols(0, axes.nrows()) * scaled;
         Self { map, offset: coordinates.offset.clone() }
     }
 
