@@ -276,6 +276,35 @@ fn special_functions() {
     assert!(matches!(of(&growing, &grids), Err(TensorProductError::Value { rows: 1, cols: 1, .. })));
 }
 
+/// The distance from `target` to the convex hull of `points`, from above: Frank-Wolfe steps with away steps.
+fn distance_to_hull(points: &[Vec<f64>], target: &[f64]) -> f64 {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut shares = vec![0.0; points.len()];
+    shares[0] = 1.0;
+    let combined =
+        |shares: &[f64]| (0..target.len()).map(|l| shares.iter().zip(points).map(|(s, p)| s * p[l]).sum()).collect();
+    for _ in 0..20_000 {
+        let at: Vec<f64> = combined(&shares);
+        let gradient: Vec<f64> = at.iter().zip(target).map(|(a, t)| a - t).collect();
+        let slope = |i: &usize| dot(&gradient, &points[*i]);
+        let order = |a: &usize, b: &usize| slope(a).total_cmp(&slope(b));
+        let (to, from) = (
+            (0..points.len()).min_by(order).unwrap(),
+            (0..points.len()).filter(|i| shares[*i] > 0.0).max_by(order).unwrap(),
+        );
+        let direction: Vec<f64> = points[to].iter().zip(&points[from]).map(|(a, b)| a - b).collect();
+        let length = dot(&direction, &direction);
+        if length == 0.0 {
+            break;
+        }
+        let step = (-dot(&gradient, &direction) / length).clamp(0.0, shares[from]);
+        shares[to] += step;
+        shares[from] -= step;
+    }
+    let at: Vec<f64> = combined(&shares);
+    at.iter().zip(target).map(|(a, t)| (a - t).powi(2)).sum::<f64>().sqrt()
+}
+
 /// Chebyshev polynomial T_n.
 fn chebyshev(n: usize, x: f64) -> f64 {
     (n as f64 * x.clamp(-1.0, 1.0).acos()).cos()
@@ -310,6 +339,52 @@ proptest! {
         }
         for depends in &model.dependencies {
             prop_assert_eq!(depends, &vec![first > 1, second > 1, false]);
+        }
+    }
+
+    /// The same for points without any order: samples at the grid points are random combinations of `rank` random matrices, so
+    /// that no hull is symmetric.
+    #[test]
+    fn samples_of_known_rank(
+        rank in 1usize..6,
+        entries in prop::collection::vec(-1.0f64..1.0, 20 * 5 + 5 * 6).no_shrink(),
+        kind in prop::sample::select(Weighting::ALL.to_vec()),
+    ) {
+        let function = |rho: &[f64]| {
+            let point = rho[0].round() as usize;
+            Mat::from_fn(2, 3, |i, j| {
+                (0..rank).map(|a| entries[5 * point + a] * entries[100 + 6 * a + 3 * i + j]).sum()
+            })
+        };
+        let grid = ParameterGrid::equidistant("p", "1", [0.0, 19.0], 20);
+        let model = TensorProductModel::of(&function, &[grid], &options(RankRule::Tolerance(1e-11), kind.1)).unwrap();
+        prop_assert_eq!(&model.ranks, &vec![rank]);
+        prop_assert_eq!(model.weights[0].count(), if kind.1 == Weighting::Box { 1 << rank } else { rank + 1 });
+        prop_assert!(model.accuracy.grid_max < 1e-10 * model.core.norm_max().max(1.0), "{:?}", model.accuracy);
+        has_the_properties(kind.0, kind.1, &model.weights[0]);
+    }
+
+    /// CNO reaches its limit: a simplex around points has locally least volume only if the centroid of every face lies in the
+    /// convex hull of the points on it (V. Klee, "Facet-centroids and volume minimization", 1986). In barycentric coordinates
+    /// the centroid of face j is 1/(k − 1) for all but j.
+    #[test]
+    fn tightest_hull_touches_at_its_facet_centroids(
+        rank in 1usize..5, entries in prop::collection::vec(-1.0f64..1.0, 20 * 5).no_shrink(),
+    ) {
+        let function = |rho: &[f64]| Mat::from_fn(1, rank, |_, a| entries[5 * rho[0].round() as usize + a]);
+        let grid = ParameterGrid::equidistant("p", "1", [0.0, 19.0], 20);
+        let model = TensorProductModel::of(&function, &[grid], &TensorProductOptions::default()).unwrap();
+        let values = &model.weights[0].values;
+        let k = values.ncols();
+        for face in 0..k {
+            let touching: Vec<Vec<f64>> = (0..values.nrows())
+                .filter(|i| values[(*i, face)] < 1e-6)
+                .map(|i| (0..k).map(|j| values[(i, j)]).collect())
+                .collect();
+            let centroid: Vec<f64> = (0..k).map(|j| if j == face { 0.0 } else { 1.0 / (k - 1) as f64 }).collect();
+            prop_assert!(!touching.is_empty());
+            let distance = distance_to_hull(&touching, &centroid);
+            prop_assert!(distance < 1e-3, "face {}: {} points, {}", face, touching.len(), distance);
         }
     }
 
