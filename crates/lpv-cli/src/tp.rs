@@ -79,7 +79,9 @@ fn refusal(file: &Path, error: &TensorProductError) -> Failure {
     let key = match error {
         TensorProductError::NoParameter | TensorProductError::Grid { .. } => "parameter",
         TensorProductError::NoRule | TensorProductError::Rank { .. } => "transformation.ranks",
-        TensorProductError::BoxTooLarge { .. } | TensorProductError::NotRelaxed { .. } => "transformation.weights",
+        TensorProductError::BoxTooLarge { .. }
+        | TensorProductError::HullTooLarge { .. }
+        | TensorProductError::NotRelaxed { .. } => "transformation.weights",
         TensorProductError::Value { .. } | TensorProductError::Zero | TensorProductError::NotConverged { .. } => {
             "model"
         }

@@ -58,5 +58,7 @@ pub struct TransformationTable {
     /// This many are kept.
     pub ranks: Option<Each<usize>>,
     pub weights: Option<Each<String>>,
+    /// Points within each grid cell that the hull holds too.
+    pub hull_points: Option<usize>,
     pub error_points: Option<usize>,
 }

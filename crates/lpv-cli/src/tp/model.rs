@@ -18,6 +18,8 @@ const MOST_NUMBERS: usize = 50_000_000;
 const MOST_GRID_POINTS: usize = 2001;
 /// Grid points of a parameter that the file says nothing about.
 const GRID_POINTS: usize = 101;
+/// Points within each grid cell that a hull has to hold.
+const MOST_HULL_POINTS: usize = 20;
 /// Points between grid points at which the error is measured.
 const MOST_ERROR_POINTS: usize = 100_000;
 
@@ -308,7 +310,12 @@ fn options(door: &Door, table: TransformationTable, parameters: usize) -> Result
         let message = format!("is {error_points}: allowed are 0 to {MOST_ERROR_POINTS}");
         return door.refuse("transformation.error_points", message);
     }
-    Ok(TensorProductOptions { ranks, weightings, error_points })
+    let hull_points = table.hull_points.unwrap_or(defaults.hull_points);
+    if hull_points > MOST_HULL_POINTS {
+        let message = format!("is {hull_points}: allowed are 0 to {MOST_HULL_POINTS} in each grid cell");
+        return door.refuse("transformation.hull_points", message);
+    }
+    Ok(TensorProductOptions { ranks, weightings, hull_points, error_points })
 }
 
 fn weighting(door: &Door, name: &str) -> Result<Weighting, Failure> {

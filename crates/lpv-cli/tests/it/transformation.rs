@@ -62,7 +62,7 @@ fn samples_are_transformed() {
 fn files_that_are_no_model() {
     let place = Place::with("");
     let tora = "[model]\nname = \"tora\"\n";
-    let cases: [(String, &[&str]); 27] = [
+    let cases: [(String, &[&str]); 28] = [
         (String::new(), &["model", "missing", "tora"]),
         ("[model]\nname = \"toro\"\n".into(), &["model.name", "toro", "tora"]),
         ("[model]\nname = 3\n".into(), &["model.name", "3"]),
@@ -96,6 +96,7 @@ fn files_that_are_no_model() {
         ),
         (format!("{tora}[transformation]\nweights = \"normal\"\n"), &["transformation.weights", "normal", "cno"]),
         (format!("{tora}[transformation]\nranks = [3, 2, 1]\n"), &["transformation.ranks", "3 entries"]),
+        (format!("{tora}[transformation]\nhull_points = 100\n"), &["transformation.hull_points", "100"]),
         (format!("{tora}[transformation]\nranks = 0\n"), &["transformation.ranks"]),
         (format!("{tora}[transformation]\ntolerance = 1.0\n"), &["transformation.tolerance"]),
         (format!("{tora}[transformation]\ntolerance = 0.1\nranks = 2\n"), &["transformation.ranks", "keep one"]),

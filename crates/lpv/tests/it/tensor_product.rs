@@ -169,6 +169,39 @@ fn weights_between_grid_points_follow_the_function() {
     assert!(fine < coarse / 8.0, "{coarse} at 12 points, {fine} at 45");
 }
 
+/// A hull that holds points between the grid points too loses less there, and its weights reach their limits at them.
+#[test]
+fn hulls_of_points_between_the_grid_points() {
+    let (tora, grids) = literature("tora");
+    let of = |hull_points| {
+        let options = TensorProductOptions { hull_points, ..Default::default() };
+        TensorProductModel::of(&|rho| tora.at(rho), &grids, &options).unwrap()
+    };
+    let (tight, held) = (of(0), of(9));
+    assert!(held.accuracy.grid_max < 1e-10, "{:?}", held.accuracy);
+    let (before, after) = (tight.accuracy.between_max, held.accuracy.between_max);
+    assert!(after < before / 20.0, "{before} without, {after} with points in the cells");
+    for weights in &held.weights {
+        has_the_properties("tora", Weighting::Cno, weights);
+    }
+}
+
+/// A model is plain data: what is read back is what was written, and interpolates its weights.
+#[test]
+fn models_are_plain_data() {
+    let (wing, grids) = literature("nata");
+    let function = |rho: &[f64]| wing.at(rho);
+    let model = TensorProductModel::of(&function, &grids, &TensorProductOptions::default()).unwrap();
+    let text = serde_json::to_string(&model).unwrap();
+    let read: TensorProductModel = serde_json::from_str(&text).unwrap();
+    assert_eq!(serde_json::to_string(&read).unwrap(), text);
+    assert_eq!(read.weights_at(&function, 0, 17.03), model.weights[0].interpolated(17.03));
+    let (rho, scale) = ([17.03, 0.1234], model.core.norm_max());
+    assert!((read.interpolated(&rho) - wing.at(&rho)).norm_max() < 1e-3 * scale);
+    assert!((model.at(&function, &rho) - wing.at(&rho)).norm_max() < 1e-6 * scale);
+    assert_eq!(read.interpolated(&[99.0, 9.0]), read.interpolated(&[25.0, 0.3]));
+}
+
 /// Wang, Tanaka and Griffin (1996) give θ̈ alone: the pole's rows of the model are theirs.
 #[test]
 fn pendulum_on_a_cart_is_the_published_one() {

@@ -41,14 +41,22 @@ pub struct TensorProductOptions {
     pub ranks: Vec<RankRule>,
     /// One for each parameter; the last goes on for those after it.
     pub weightings: Vec<Weighting>,
+    /// Points within each grid cell that the hull has to hold besides the grid points; they are sampled for it. A hull of the
+    /// grid points alone leaves out a little of the curve between them.
+    pub hull_points: usize,
     /// Points between grid points at which the error is measured, at most.
     pub error_points: usize,
 }
 
 impl Default for TensorProductOptions {
-    /// Exact rank (singular values above 10⁻¹² of the largest), CNO, 2000 points.
+    /// Exact rank (singular values above 10⁻¹² of the largest), CNO around the grid points, 2000 points.
     fn default() -> Self {
-        Self { ranks: vec![RankRule::Tolerance(1e-12)], weightings: vec![Weighting::Cno], error_points: 2000 }
+        Self {
+            ranks: vec![RankRule::Tolerance(1e-12)],
+            weightings: vec![Weighting::Cno],
+            hull_points: 0,
+            error_points: 2000,
+        }
     }
 }
 
@@ -103,6 +111,16 @@ pub enum TensorProductError {
         parameter: String,
         /// Its coordinates.
         coordinates: usize,
+    },
+    /// A least-volume hull with too many vertices.
+    #[error(
+        "a CNO hull for {parameter} would have {weights} vertices; keep fewer singular values, or take another weighting"
+    )]
+    HullTooLarge {
+        /// Of which parameter.
+        parameter: String,
+        /// Its vertices.
+        weights: usize,
     },
     /// INO-RNO weights that are not found.
     #[error("no INO-RNO weights are found for {parameter}; take \"ino\" or \"cno\"")]
@@ -184,12 +202,13 @@ impl TensorProductModel {
         if samples.norm_max() == 0.0 {
             return Err(TensorProductError::Zero);
         }
-        let mut model = Self::of_samples(&samples, parameters, options, size)?;
+        let mut model = Self::of_samples(function, &samples, parameters, options, size)?;
         model.measure(function, &samples, options.error_points);
         Ok(model)
     }
 
     fn of_samples(
+        function: MatrixOf,
         samples: &Tensor,
         parameters: &[ParameterGrid],
         options: &TensorProductOptions,
@@ -207,9 +226,11 @@ impl TensorProductModel {
                 decomposition.singular_values[rank..].iter().map(|value| (value / norm).powi(2)).sum::<f64>();
             let left = Mat::from_fn(parameter.points.len(), rank, |i, j| decomposition.left[(i, j)]);
             let coordinates = Coordinates::of(&left, discarded.sqrt()).ok_or_else(not_converged)?;
-            projections.push(Projection::of(&decomposition, &coordinates));
-            let points = coordinates.points;
-            let functions = WeightFunctions::new(parameter.clone(), *rule_of(&options.weightings, n), points)?;
+            let projection = Projection::of(&decomposition, &coordinates);
+            let between = between(function, parameters, n, options.hull_points, size, &projection);
+            let kind = *rule_of(&options.weightings, n);
+            let functions = WeightFunctions::new(parameter.clone(), kind, coordinates.points, &between)?;
+            projections.push(projection);
             let project = orthogonal(&functions.points);
             bound += residual(samples, n, &functions.points, &project).powi(2);
             coefficients = coefficients.mode_product(n, &project);
@@ -269,7 +290,7 @@ impl TensorProductModel {
         self.combine(&weights)
     }
 
-    /// The errors at the grid points and at the centres of at most `most` cells.
+    /// The errors at the grid points and in the interior of at most `most` cells.
     fn measure(&mut self, function: MatrixOf, samples: &Tensor, most: usize) {
         let values = self.weights.iter().map(|w| &w.values);
         let built = values.enumerate().fold(self.core.clone(), |core, (n, w)| core.mode_product(n, w));
@@ -278,21 +299,23 @@ impl TensorProductModel {
         self.accuracy.grid_norm = error.norm();
         self.accuracy.grid_max = error.norm_max();
 
-        let centres: Vec<Vec<f64>> = (self.weights.iter())
-            .map(|w| w.grid.points.windows(2).map(|ends| 0.5 * (ends[0] + ends[1])).collect())
+        // the golden section is on no equidistant subdivision, whose points a hull may hold
+        let inside = (5f64.sqrt() - 1.0) / 2.0;
+        let insides: Vec<Vec<f64>> = (self.weights.iter())
+            .map(|w| w.grid.points.windows(2).map(|ends| ends[0] + inside * (ends[1] - ends[0])).collect())
             .collect();
-        let weights: Vec<Vec<Vec<f64>>> = (centres.iter().enumerate())
+        let weights: Vec<Vec<Vec<f64>>> = (insides.iter().enumerate())
             .map(|(n, values)| values.iter().map(|value| self.weights_at(function, n, *value)).collect())
             .collect();
-        let cells: usize = centres.iter().map(Vec::len).product();
+        let cells: usize = insides.iter().map(Vec::len).product();
         let chosen = cells.min(most);
         let mut squares = 0.0;
         for c in 0..chosen {
             // spread over all cells
             let mut index = (c as u128 * cells as u128 / chosen as u128) as usize;
-            let rho = point(&centres, index);
+            let rho = point(&insides, index);
             let mut own = Vec::new();
-            for (n, values) in centres.iter().enumerate().rev() {
+            for (n, values) in insides.iter().enumerate().rev() {
                 own.push(weights[n][index % values.len()].clone());
                 index /= values.len();
             }
@@ -323,6 +346,29 @@ impl Projection {
         let along = |j: usize| slice.iter().enumerate().map(|(i, entry)| entry * self.map[(i, j)]).sum::<f64>();
         std::iter::once(1.0).chain((0..self.map.ncols()).map(|j| along(j) - self.offset[j])).collect()
     }
+}
+
+/// The points (1, y) of parameter `n` at `per_cell` values within each cell of its grid.
+fn between(
+    function: MatrixOf,
+    parameters: &[ParameterGrid],
+    n: usize,
+    per_cell: usize,
+    size: (usize, usize),
+    projection: &Projection,
+) -> Vec<Vec<f64>> {
+    let mut grids: Vec<Vec<f64>> = parameters.iter().map(|parameter| parameter.points.clone()).collect();
+    let step = 1.0 / (per_cell + 1) as f64;
+    let values = (parameters[n].points.windows(2))
+        .flat_map(|ends| (1..=per_cell).map(move |k| ends[0] + k as f64 * step * (ends[1] - ends[0])));
+    values
+        .map(|value| {
+            grids[n] = vec![value];
+            projection.point(sample(function, &grids, size).entries())
+        })
+        // a function that has no value there says so where the error is measured
+        .filter(|point| point.iter().all(|coordinate| coordinate.is_finite()))
+        .collect()
 }
 
 /// Pᵀ/I, the left inverse of P: its columns are orthogonal with squared length I.

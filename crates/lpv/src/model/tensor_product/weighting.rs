@@ -52,7 +52,8 @@ impl Weighting {
     }
 }
 
-/// What the hull of one parameter's weights is like, at the grid points.
+/// What the hull of one parameter's weights is like, at the points that it is made to hold: the grid points, and those between
+/// them that were asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HullQuality {
     /// The smallest value of each weight.
@@ -125,6 +126,8 @@ impl Shape {
 const FLAT: f64 = 1e-8;
 /// Starts of the searches for CNO and INO-RNO, besides the inscribed simplex.
 const STARTS: usize = 12;
+/// Weights of a CNO hull: the search takes steps in k(k − 1) unknowns.
+const MOST_TIGHTENED: usize = 12;
 /// Coordinates of a box; there are two to this power vertices.
 const MOST_BOX_COORDINATES: usize = 10;
 
@@ -158,12 +161,25 @@ impl Coordinates {
 }
 
 impl WeightFunctions {
-    /// The weights of `kind` over the points.
+    /// The weights of `kind` over the `grid_points` (rows of P), in a hull that holds these and the points `between` them.
     ///
     /// # Errors
-    /// A box of more than ten coordinates; an INO-RNO simplex that is not found.
-    pub(super) fn new(grid: ParameterGrid, kind: Weighting, points: Mat<f64>) -> Result<Self, TensorProductError> {
-        let k = points.ncols();
+    /// A box of more than ten coordinates, CNO of more than twelve weights, an INO-RNO simplex that is not found.
+    pub(super) fn new(
+        grid: ParameterGrid,
+        kind: Weighting,
+        grid_points: Mat<f64>,
+        between: &[Vec<f64>],
+    ) -> Result<Self, TensorProductError> {
+        let (count, k) = (grid_points.nrows(), grid_points.ncols());
+        let points =
+            Mat::from_fn(
+                count + between.len(),
+                k,
+                |i, j| {
+                    if i < count { grid_points[(i, j)] } else { between[i - count][j] }
+                },
+            );
         let inscribed = inscribed(&points);
         let starts =
             || std::iter::once(inscribed.clone()).chain((0..STARTS).map(|s| rotated(k, s))).collect::<Vec<_>>();
@@ -175,6 +191,9 @@ impl WeightFunctions {
             // an interval is the only simplex with two vertices that touches
             Weighting::Ino => Shape::Simplex(touching(&points, &inscribed)),
             Weighting::Cno | Weighting::InoRno if k == 2 => Shape::Simplex(touching(&points, &inscribed)),
+            Weighting::Cno if k > MOST_TIGHTENED => {
+                return Err(TensorProductError::HullTooLarge { parameter: grid.name.clone(), weights: k });
+            }
             Weighting::Cno => Shape::Simplex(minimum_volume(&points, &starts())),
             Weighting::InoRno => Shape::Simplex(
                 relaxed(&points, &starts())
@@ -188,10 +207,10 @@ impl WeightFunctions {
                 Shape::Box((1..k).map(|j| [minima[j], maxima[j]]).collect())
             }
         };
-        let shape = ordered(&points, shape);
+        let shape = ordered(&grid_points, shape);
         let weights: Vec<Vec<f64>> =
             (0..points.nrows()).map(|i| convex(kind, shape.weights(&row(&points, i)))).collect();
-        let values = Mat::from_fn(points.nrows(), weights[0].len(), |i, j| weights[i][j]);
+        let all = Mat::from_fn(points.nrows(), weights[0].len(), |i, j| weights[i][j]);
         let sum_error = weights.iter().map(|row| (row.iter().sum::<f64>() - 1.0).abs()).fold(0.0, f64::max);
         let volume = match &shape {
             Shape::Simplex(t) => -log_determinant(t),
@@ -202,12 +221,13 @@ impl WeightFunctions {
             }
         };
         let hull = HullQuality {
-            minima: column_minima(&values),
-            maxima: column_maxima(&values),
+            minima: column_minima(&all),
+            maxima: column_maxima(&all),
             sum_error,
             volume_ratio: (volume + log_determinant(&inscribed)).exp(),
         };
-        Ok(Self { grid, kind, values, hull, points, shape })
+        let values = all.subrows(0, count).to_owned();
+        Ok(Self { grid, kind, values, hull, points: grid_points, shape })
     }
 
     /// The number of weights.
