@@ -1,5 +1,6 @@
 //! The TOML tables of a model to transform, as they stand in the file.
 
+use crate::scenario::file::WeightsTable;
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -9,6 +10,8 @@ pub struct ModelFile {
     pub model: Option<toml::Table>,
     /// A plant by name with its parameters, as in a scenario.
     pub plant: Option<toml::Table>,
+    /// Of a plant: the regulator's gain is transformed instead of the model.
+    pub weights: Option<WeightsTable>,
     #[serde(default)]
     pub parameter: Vec<ParameterTable>,
     #[serde(default)]

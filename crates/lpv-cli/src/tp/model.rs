@@ -4,9 +4,11 @@
 use super::file::{ModelFile, ParameterTable, SamplesTable, TransformationTable};
 use crate::failure::Failure;
 use crate::scenario::door::Door;
-use crate::scenario::file::{engineers_words, plant, toml_message};
+use crate::scenario::file::{WeightsTable, engineers_words, plant, toml_message};
+use crate::scenario::weights::definite;
 use lpv::math::Mat;
 use lpv::math::matrix::from_rows;
+use lpv::math::riccati;
 use lpv::model::linearize;
 use lpv::model::literature::LiteratureModel;
 use lpv::model::tensor_product::{ParameterGrid, RankRule, TensorProductOptions, Weighting};
@@ -68,7 +70,10 @@ impl TransformationPlan {
             (None, None) => {
                 return door.refuse("model", format!("is missing: give {}, samples, or a [plant]", names()));
             }
-            (None, Some(table)) => of_plant(&door, table)?,
+            (Some(_), None) if file.weights.is_some() => {
+                return door.refuse("weights", "belongs to a [plant], whose regulator is then transformed; remove it");
+            }
+            (None, Some(table)) => of_plant(&door, table, file.weights)?,
             (Some(table), None) if table.contains_key("samples") => of_samples(&door, table, parameters)?,
             (Some(table), None) => of_literature(&door, table)?,
         };
@@ -127,24 +132,34 @@ fn of_literature(door: &Door, table: toml::Table) -> Result<Source, Failure> {
     })
 }
 
-fn of_plant(door: &Door, table: toml::Table) -> Result<Source, Failure> {
+fn of_plant(door: &Door, table: toml::Table, weights: Option<WeightsTable>) -> Result<Source, Failure> {
     let plant = plant(door, table)?.build().or_else(|error| door.refuse("plant", error.to_string()))?;
     let description = plant.description();
     let Some(scheduling) = description.scheduling.clone() else {
         let message = format!("\"{}\" has no scheduling parameter: there is nothing to transform", description.name);
         return door.refuse("plant", message);
     };
-    Ok(Source {
-        title: format!("[A B] of {}", description.name),
-        source: None,
-        function: Box::new(move |rho| {
+    let (name, parameters) =
+        (description.name.clone(), Some(vec![(scheduling.parameter, scheduling.unit, scheduling.range, GRID_POINTS)]));
+    let Some(weights) = weights else {
+        let function: Function = Box::new(move |rho| {
             let point = linearize(&*plant, rho[0]);
             let n = point.a.ncols();
             Mat::from_fn(n, n + point.b.ncols(), |i, j| if j < n { point.a[(i, j)] } else { point.b[(i, j - n)] })
-        }),
-        parameters: Some(vec![(scheduling.parameter, scheduling.unit, scheduling.range, GRID_POINTS)]),
-        samples: None,
-    })
+        });
+        return Ok(Source { title: format!("[A B] of {name}"), source: None, function, parameters, samples: None });
+    };
+    let (n, m) = (description.states.len(), description.inputs.len());
+    let q = definite(door, "weights.Q", weights.q, weights.q_diag, n)?;
+    let r = definite(door, "weights.R", weights.r, weights.r_diag, m)?;
+    let function: Function = Box::new(move |rho| {
+        let point = linearize(&*plant, rho[0]);
+        // without a gain there is no number: the transformation says where
+        riccati::solve(&point.a, &point.b, &q, &r)
+            .map_or_else(|_| Mat::from_fn(m, n, |_, _| f64::NAN), |regulator| regulator.k)
+    });
+    let title = format!("the regulator K of {name}, u = -Kx");
+    Ok(Source { title, source: None, function, parameters, samples: None })
 }
 
 fn of_samples(door: &Door, table: toml::Table, parameters: &[ParameterTable]) -> Result<Source, Failure> {

@@ -38,6 +38,22 @@ fn shipped_models_are_transformed() {
     }
 }
 
+/// K(ψ) = K(0)T(ψ) of the quadrotor has the constant, sin ψ and cos ψ: rank 3 (thesis 4.2.3).
+#[test]
+fn regulators_are_transformed() {
+    let place = Place::with("");
+    place.write("gain.toml", shipped("quadrotor-gain"));
+    let record = parsed(&place.succeed("tp gain.toml --json"));
+    assert_eq!(record["size"], serde_json::json!([4, 12]));
+    assert_eq!(record["parameters"][0]["rank"], 3);
+    assert!(record["accuracy"]["grid_max"].as_f64().unwrap() < 1e-6);
+    let tora = "[model]\nname = \"tora\"\n[weights]\nQ_diag = [1, 1, 1, 1]\nR_diag = [1]\n";
+    place.write("model.toml", tora);
+    place.lpv("tp model.toml").refuses(2, &["model.toml", "weights", "plant"]);
+    place.write("model.toml", "[plant]\nname = \"quadrotor\"\n[weights]\nQ_diag = [1]\nR_diag = [1, 1, 1, 1]\n");
+    place.lpv("tp model.toml").refuses(2, &["model.toml", "weights.Q"]);
+}
+
 /// S(p, q) = [pq, q²] has rank 2 in p and in q, and so have its samples on any grid.
 #[test]
 fn samples_are_transformed() {
