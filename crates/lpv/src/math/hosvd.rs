@@ -21,10 +21,14 @@ pub struct ModeDecomposition {
 /// If there is no such mode.
 pub fn decompose_mode(tensor: &Tensor, mode: usize) -> Option<ModeDecomposition> {
     // the transpose is tall; a Gram matrix would be cheaper, but would lose singular values below √ε σ₁
-    let unfolding = tensor.unfolding_transposed(mode);
+    // scaled to entries of at most one, whose squares do not overflow
+    let largest = tensor.norm_max();
+    let scale = if largest > 0.0 { largest } else { 1.0 };
+    let original = tensor.unfolding_transposed(mode);
+    let unfolding = Mat::from_fn(original.nrows(), original.ncols(), |i, j| original[(i, j)] / scale);
     let svd = unfolding.thin_svd().ok()?;
     let count = unfolding.nrows().min(unfolding.ncols());
-    let singular_values: Vec<f64> = (0..count).map(|k| svd.S()[k]).collect();
+    let singular_values: Vec<f64> = (0..count).map(|k| scale * svd.S()[k]).collect();
     let vectors = svd.V();
     let sign = |k: usize| {
         let largest = (0..vectors.nrows()).map(|i| vectors[(i, k)]).fold(0.0, largest_magnitude);

@@ -186,6 +186,24 @@ fn hulls_of_points_between_the_grid_points() {
     }
 }
 
+/// Units do not matter: entries near the ends of the range of numbers are transformed like their multiples near one.
+#[test]
+fn large_and_small_entries() {
+    let (tora, grids) = literature("tora");
+    for scale in [1e300, 1e-290] {
+        let function = |rho: &[f64]| tora.at(rho) * scale;
+        let model = TensorProductModel::of(&function, &grids, &TensorProductOptions::default()).unwrap();
+        assert_eq!(model.ranks, [5, 2]);
+        assert!((model.singular_values[0][4] / scale - 0.0068889706).abs() < 5e-10);
+        assert!(model.accuracy.grid_max < 1e-10 * scale, "{:?}", model.accuracy);
+        assert!(
+            model.accuracy.between_rms < 1e-3 * scale && model.accuracy.bound < 1e-10 * scale,
+            "{:?}",
+            model.accuracy
+        );
+    }
+}
+
 /// A model is plain data: what is read back is what was written, and interpolates its weights.
 #[test]
 fn models_are_plain_data() {

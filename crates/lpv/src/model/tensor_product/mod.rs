@@ -232,7 +232,7 @@ impl TensorProductModel {
             let functions = WeightFunctions::new(parameter.clone(), kind, coordinates.points, &between)?;
             projections.push(projection);
             let project = orthogonal(&functions.points);
-            bound += residual(samples, n, &functions.points, &project).powi(2);
+            bound = f64::hypot(bound, residual(samples, n, &functions.points, &project));
             coefficients = coefficients.mode_product(n, &project);
             singular_values.push(decomposition.singular_values);
             ranks.push(rank);
@@ -241,7 +241,7 @@ impl TensorProductModel {
         let core = (weights.iter().enumerate())
             .fold(coefficients, |core, (n, functions)| core.mode_product(n, &functions.vertices()));
         let accuracy = Accuracy {
-            bound: bound.sqrt(),
+            bound,
             grid_norm: 0.0,
             grid_max: 0.0,
             between_max: 0.0,
@@ -309,7 +309,7 @@ impl TensorProductModel {
             .collect();
         let cells: usize = insides.iter().map(Vec::len).product();
         let chosen = cells.min(most);
-        let mut squares = 0.0;
+        let mut norm: f64 = 0.0;
         for c in 0..chosen {
             // spread over all cells
             let mut index = (c as u128 * cells as u128 / chosen as u128) as usize;
@@ -325,10 +325,10 @@ impl TensorProductModel {
                 self.accuracy.between_max = difference.norm_max();
                 self.accuracy.between_at = rho;
             }
-            squares += difference.squared_norm_l2();
+            norm = norm.hypot(difference.norm_l2());
         }
         self.accuracy.between_points = chosen;
-        self.accuracy.between_rms = (squares / (chosen.max(1) * self.size[0] * self.size[1]) as f64).sqrt();
+        self.accuracy.between_rms = norm / ((chosen.max(1) * self.size[0] * self.size[1]) as f64).sqrt();
     }
 }
 
