@@ -384,7 +384,7 @@ proptest! {
         let options = options(RankRule::Tolerance(1e-9), kind.1);
         let model = TensorProductModel::of(&function, &grids, &options).unwrap();
         prop_assert_eq!(&model.ranks, &vec![first, second, 1]);
-        prop_assert!(model.accuracy.grid_max < 1e-10 * model.core.norm_max().max(1.0), "{:?}", model.accuracy);
+        prop_assert!(model.accuracy.grid_max < 1e-10 * model.core.norm_max().max(1.0), "{} {:?}", kind.0, model.accuracy);
         for weights in &model.weights {
             has_the_properties(kind.0, kind.1, weights);
         }
@@ -411,8 +411,35 @@ proptest! {
         let model = TensorProductModel::of(&function, &[grid], &options(RankRule::Tolerance(1e-11), kind.1)).unwrap();
         prop_assert_eq!(&model.ranks, &vec![rank]);
         prop_assert_eq!(model.weights[0].count(), if kind.1 == Weighting::Box { 1 << rank } else { rank + 1 });
-        prop_assert!(model.accuracy.grid_max < 1e-10 * model.core.norm_max().max(1.0), "{:?}", model.accuracy);
+        prop_assert!(model.accuracy.grid_max < 1e-10 * model.core.norm_max().max(1.0), "{} {:?}", kind.0, model.accuracy);
         has_the_properties(kind.0, kind.1, &model.weights[0]);
+    }
+
+    /// Points of great symmetry, where faces could come in parallel pairs: samples of zeros and ones.
+    #[test]
+    fn samples_of_zeros_and_ones(
+        entries in prop::collection::vec(0u8..2, 12 * 4).no_shrink(),
+        kind in prop::sample::select(Weighting::ALL.to_vec()),
+    ) {
+        prop_assume!(entries.contains(&1));
+        let function = |rho: &[f64]| {
+            let point = (3.0 * rho[0] + rho[1]).round() as usize;
+            Mat::from_fn(2, 2, |i, j| f64::from(entries[4 * point + 2 * i + j]))
+        };
+        let grid = |name, count: usize| ParameterGrid::equidistant(name, "1", [0.0, count as f64 - 1.0], count);
+        let exact = options(RankRule::Tolerance(1e-11), kind.1);
+        match TensorProductModel::of(&function, &[grid("p", 4), grid("q", 3)], &exact) {
+            Ok(model) => {
+                prop_assert!(model.accuracy.grid_max < 1e-10 * model.core.norm_max().max(1.0), "{} {:?}", kind.0, model.accuracy);
+                for weights in &model.weights {
+                    has_the_properties(kind.0, kind.1, weights);
+                }
+            }
+            Err(error) => {
+                let is_said = matches!(error, TensorProductError::NotRelaxed { .. });
+                prop_assert!(kind.1 == Weighting::InoRno && is_said, "{}", error);
+            }
+        }
     }
 
     /// CNO reaches its limit: a simplex around points has locally least volume only if the centroid of every face lies in the

@@ -5,7 +5,7 @@
 //! Minimise −log|det T| subject to W = PT ≥ 0 and T1 = e₁. The problem is not convex: a log-barrier method with regularised
 //! Newton steps finds a local minimum from each of several starts, and the best is taken.
 
-use super::simplex::touching;
+use super::simplex::{log_determinant, touching};
 use crate::math::Mat;
 use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::matrix::{inverse, solve};
@@ -17,11 +17,6 @@ const BARRIER: (f64, f64, f64) = (1e-1, 1e-12, 0.2);
 const MOST_STEPS: usize = 30;
 /// A start is drawn this far towards its centre, so that no weight is zero.
 const INTERIOR: f64 = 0.1;
-
-/// log|det T|, which grows as the simplex shrinks.
-pub fn log_determinant(simplex: &Mat<f64>) -> f64 {
-    simplex.determinant().abs().ln()
-}
 
 /// The best of the local minima from `starts`; every face touches the points.
 pub fn minimum_volume(points: &Mat<f64>, starts: &[Mat<f64>]) -> Mat<f64> {

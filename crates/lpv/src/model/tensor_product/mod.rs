@@ -97,7 +97,7 @@ pub enum TensorProductError {
     #[error("the function is zero at every grid point")]
     Zero,
     /// A decomposition that does not converge.
-    #[error("the singular value decomposition for {parameter} does not converge")]
+    #[error("the singular value decomposition for {parameter} does not converge, or overflows: scale the function")]
     NotConverged {
         /// Of which parameter.
         parameter: String,

@@ -4,7 +4,7 @@
 //! volume.
 
 use crate::math::Mat;
-use crate::math::matrix::inverse;
+use crate::math::matrix::{inverse, is_finite};
 
 /// The smallest entry of each column.
 pub fn column_minima(matrix: &Mat<f64>) -> Vec<f64> {
@@ -96,15 +96,16 @@ const MOST_ALTERNATIONS: usize = 2000;
 /// How far the maxima of the weights may differ.
 const EQUAL: f64 = 1e-12;
 
-/// A simplex whose faces all touch the points and whose weights all have the same maximum (INO-RNO), as large as the starts
-/// give; `None` if the alternation converges from none of them.
+/// A simplex whose faces all touch the points and whose weights all have the same maximum (INO-RNO), the one of least volume
+/// that the starts lead to; `None` if there is none.
 ///
 /// A face with normal m gives the weight (mᵀy − min mᵀy)/S with S = −Σ min mⱼᵀy; its maximum is the width of the points
-/// along m over S. Wanted are normals of width one that sum to zero; the two conditions are imposed in turn.
+/// along m over S. Wanted are normals of width one that sum to zero; the two conditions are imposed in turn. Normals that
+/// do so in opposite pairs bound no simplex.
 pub fn relaxed(points: &Mat<f64>, starts: &[Mat<f64>]) -> Option<Mat<f64>> {
     let k = points.ncols();
     let found = starts.iter().filter_map(|start| {
-        let mut normals = start.clone();
+        let mut normals = Mat::from_fn(k, k, |i, j| if i == 0 { 0.0 } else { start[(i, j)] });
         for _ in 0..MOST_ALTERNATIONS {
             let weights = points * &normals;
             let (minima, maxima) = (column_minima(&weights), column_maxima(&weights));
@@ -114,7 +115,7 @@ pub fn relaxed(points: &Mat<f64>, starts: &[Mat<f64>]) -> Option<Mat<f64>> {
                 let size = -minima.iter().sum::<f64>();
                 let simplex =
                     Mat::from_fn(k, k, |i, j| (normals[(i, j)] - if i == 0 { minima[j] } else { 0.0 }) / size);
-                return Some((mean / size, simplex));
+                return is_simplex(points, &simplex).then_some(simplex);
             }
             // the sum of each row after the first back to zero
             let unit = Mat::from_fn(k, k, |i, j| if i == 0 { 0.0 } else { normals[(i, j)] / widths[j] });
@@ -122,5 +123,19 @@ pub fn relaxed(points: &Mat<f64>, starts: &[Mat<f64>]) -> Option<Mat<f64>> {
         }
         None
     });
-    found.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, simplex)| simplex)
+    found.max_by(|a, b| log_determinant(a).total_cmp(&log_determinant(b)))
+}
+
+/// How far weights and vertices may be from giving the points back.
+const DEGENERATE: f64 = 1e-9;
+
+/// Whether the vertices with the weights give the points back: not so if the faces meet in no vertex.
+fn is_simplex(points: &Mat<f64>, simplex: &Mat<f64>) -> bool {
+    let error = points * simplex * inverse(simplex) - points;
+    is_finite(&error) && error.norm_max() < DEGENERATE * points.norm_max()
+}
+
+/// log|det T|, which grows as the simplex shrinks.
+pub fn log_determinant(simplex: &Mat<f64>) -> f64 {
+    simplex.determinant().abs().ln()
 }

@@ -4,8 +4,8 @@
 //! simplex T around them (or products of intervals, for a box), and the simplex is what distinguishes SN, SNNN, NO, CNO, INO
 //! and INO-RNO.
 
-use super::minimum_volume::{log_determinant, minimum_volume};
-use super::simplex::{column_maxima, column_minima, inscribed, regular, relaxed, scaled, touching};
+use super::minimum_volume::minimum_volume;
+use super::simplex::{column_maxima, column_minima, inscribed, log_determinant, regular, relaxed, scaled, touching};
 use super::{ParameterGrid, TensorProductError};
 use crate::math::Mat;
 use crate::math::hosvd::right_singular;
