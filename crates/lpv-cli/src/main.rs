@@ -1,7 +1,7 @@
 //! The program `lpv`: from a nonlinear plant to a checked gain-scheduled controller and its flight.
 //!
 //! Each subcommand is a file; what several share is beside them:
-//! `scenario` and `problem` read TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
+//! `scenario`, `problem` and `tp` read TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
 //! `table` lays them out, `output` prints, `folder` keeps results whole, `failure` is every way to end that is not success.
 
 mod certify;
@@ -22,6 +22,7 @@ mod sdp;
 mod simulate;
 mod table;
 mod thesis;
+mod tp;
 
 use clap::{Parser, Subcommand};
 use std::io::Write;
@@ -51,6 +52,8 @@ enum Command {
     Thesis(thesis::ThesisArguments),
     /// Solve a semidefinite program from an SDPA sparse file
     Sdp(sdp::SdpArguments),
+    /// Transform an LPV model to tensor-product form
+    Tp(tp::TpArguments),
 }
 
 fn main() -> ExitCode {
@@ -61,6 +64,7 @@ fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Thesis(arguments) => thesis::run(&arguments),
         Command::Sdp(arguments) => sdp::run(&arguments),
+        Command::Tp(arguments) => tp::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

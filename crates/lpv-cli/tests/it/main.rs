@@ -7,3 +7,4 @@ mod run;
 mod sdp;
 mod stages;
 mod thesis;
+mod transformation;

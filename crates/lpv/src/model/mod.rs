@@ -5,8 +5,10 @@
 
 mod basis;
 mod grid;
+pub mod literature;
 mod polytope;
 mod polytopic;
+pub mod tensor_product;
 
 pub use basis::{BasisFunction, MatrixFunction};
 pub use grid::{FrozenModel, GridModel, linearize, parameter_grid};

@@ -10,3 +10,4 @@ mod polytopic;
 mod proofs;
 mod quadrotor;
 mod synthesis;
+mod tensor_product;
