@@ -181,7 +181,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         }
         since_progress = if much || witness < 0.9 * best_witness { 0 } else { since_progress + 1 };
         best_witness = best_witness.min(witness);
-        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) { 3 } else { 15 };
+        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) { 1 } else { 15 };
         if since_progress > patience {
             break Ending::Stopped(InaccurateReason::Stalled);
         }

@@ -10,7 +10,7 @@ use std::time::Duration;
 pub struct Options {
     /// Interior-point iterations at most (default 150).
     pub max_iterations: usize,
-    /// Relative duality gap |p − d| / (1 + |p| + |d|) to aim for (default 1e-9).
+    /// Relative duality gap |p − d| / (1 + |p| + |d|) to aim for (default 1e-8).
     ///
     /// When rounding stops the iteration earlier, [`Outcome::Solved`](crate::Outcome::Solved) is still given for a
     /// gap of at most 1e-7, never for a larger one.
@@ -33,7 +33,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             max_iterations: 150,
-            gap_tolerance: 1e-9,
+            gap_tolerance: 1e-8,
             feasibility_tolerance: 1e-7,
             margin: 1e-12,
             cancel: None,
