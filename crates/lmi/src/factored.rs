@@ -14,7 +14,11 @@ use crate::dense::axpy;
 use crate::vectorized::vectorized;
 use std::collections::HashMap;
 
-/// One stack before compilation: columns of U and V, and for entry (r, s) of X the scalar unknown `positions[r·|V| + s]`.
+/// In place of a scalar unknown where a stack has a zero.
+pub(crate) const NO_UNKNOWN: usize = usize::MAX;
+
+/// One stack before compilation: columns of U and V, and for entry (r, s) of X the scalar unknown `positions[r·|V| + s]`
+/// (or [`NO_UNKNOWN`]).
 #[derive(Debug)]
 pub(crate) struct Stack {
     pub u: Vec<Vec<f64>>,
@@ -70,10 +74,10 @@ enum Places {
 impl Places {
     fn of(positions: &[usize]) -> Self {
         let first = positions[0];
-        if positions.iter().enumerate().all(|(s, &position)| position == first + s) {
+        if first != NO_UNKNOWN && positions.iter().enumerate().all(|(s, &position)| position == first + s) {
             return Self::Run(first);
         }
-        Self::Scattered(positions.iter().copied().max().unwrap_or(first))
+        Self::Scattered(positions.iter().copied().filter(|&at| at != NO_UNKNOWN).max().unwrap_or(0))
     }
 
     fn last(self, cols: usize) -> usize {
@@ -130,13 +134,16 @@ impl Factored {
             stack.v.iter().for_each(|column| w.push(column));
             let mut seen: HashMap<usize, usize> = HashMap::new();
             for (at, &position) in stack.positions.iter().enumerate() {
+                if position == NO_UNKNOWN {
+                    continue;
+                }
                 let entry = (at / cols, at % cols);
                 match seen.get(&position) {
-                    Some(&row) => {
+                    Some(&row) if rows[row].count == 1 => {
                         rows[row].entries[1] = entry;
                         rows[row].count = 2;
                     }
-                    None => {
+                    _ => {
                         seen.insert(position, rows.len());
                         rows.push(Row { position, group: groups.len(), entries: [entry; 2], count: 1 });
                     }
@@ -150,6 +157,18 @@ impl Factored {
 
     pub fn is_empty(&self) -> bool {
         self.groups.is_empty()
+    }
+
+    /// Operations that a Schur complement takes, roughly; those on whole columns and rows counted by vectors of about six.
+    pub fn cost(&self) -> usize {
+        let (n, w, filled) = (self.n, self.w.len(), self.w.entries.len());
+        let projection = filled * n / 6 + filled * w / 2;
+        let padded = |g: &Group| g.cols.next_multiple_of(PADDING);
+        // Each row reaches half of the others on average.
+        let products: usize = self.groups.iter().map(|g| g.rows * padded(g)).sum();
+        let gathered: usize = self.groups.iter().map(|g| g.rows + padded(g)).sum();
+        let terms: usize = self.rows.iter().map(|row| 4 * row.count).sum();
+        2 * projection + terms * (products / 12 + gathered / 4) + self.rows.len() * products / 6
     }
 
     pub fn scratch(&self) -> FactoredScratch {
@@ -183,7 +202,7 @@ impl Factored {
     /// Visits the products u_i v_j that make up the coefficients as (row, column, unknown, value), row ≥ column.
     pub fn entries(&self, visit: &mut dyn FnMut(usize, usize, Option<usize>, f64)) {
         for group in &self.groups {
-            for (at, &position) in group.positions.iter().enumerate() {
+            for (at, &position) in group.positions.iter().enumerate().filter(|(_, at)| **at != NO_UNKNOWN) {
                 for &(i, u) in self.w.column(group.u + at / group.cols) {
                     for &(j, v) in self.w.column(group.v + at % group.cols) {
                         visit(i.max(j), i.min(j), Some(position), u * v);
@@ -204,7 +223,7 @@ impl Factored {
         let lengths: Vec<f64> = (0..self.w.len()).map(length).collect();
         for group in &self.groups {
             for r in 0..group.rows {
-                for s in 0..group.cols {
+                for s in (0..group.cols).filter(|s| group.positions[r * group.cols + s] != NO_UNKNOWN) {
                     let norm = 2.0_f64.sqrt() * lengths[group.u + r] * lengths[group.v + s];
                     let out = &mut out[group.positions[r * group.cols + s]];
                     *out = out.max(norm);
@@ -311,7 +330,7 @@ fn add_from(h: &Group, position: usize, padded: usize, sum: &[f64], target: &mut
             }
             Places::Scattered(last) if last >= position => {
                 for (&at, value) in h.positions[r * h.cols..(r + 1) * h.cols].iter().zip(sum) {
-                    if at >= position {
+                    if at >= position && at != NO_UNKNOWN {
                         target[at] += value;
                     }
                 }
@@ -337,7 +356,9 @@ vectorized! {
             for &(i, value) in w.column(group.u + r) {
                 let positions = &group.positions[r * group.cols..(r + 1) * group.cols];
                 for (s, position) in positions.iter().enumerate() {
-                    t[i + s * n] += value * x[*position];
+                    if *position != NO_UNKNOWN {
+                        t[i + s * n] += value * x[*position];
+                    }
                 }
             }
         }
@@ -370,8 +391,12 @@ vectorized! {
                 axpy(2.0 * factor * value, &h[i * n..(i + 1) * n], hv);
             }
             for r in 0..group.rows {
+                let at = group.positions[r * group.cols + s];
+                if at == NO_UNKNOWN {
+                    continue;
+                }
                 let inner: f64 = w.column(group.u + r).iter().map(|&(i, value)| value * hv[i]).sum();
-                out[group.positions[r * group.cols + s]] += inner;
+                out[at] += inner;
             }
         }
     }

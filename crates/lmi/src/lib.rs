@@ -73,6 +73,7 @@ mod schur;
 pub mod sdpa;
 mod sparse;
 mod start;
+mod structure;
 mod vectorized;
 mod verification;
 

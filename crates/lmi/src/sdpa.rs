@@ -31,9 +31,9 @@ use crate::factored::Factored;
 use crate::lowering::{Layout, check_size};
 use crate::report::{Original, Translation, report};
 use crate::rigorous::Enclosure;
-use crate::sparse::{Entry, Sparse};
+use crate::sparse::{Entry, Sparse, merge};
 use crate::verification::Spectrum;
-use crate::{Error, Mat, Options, balancing};
+use crate::{Error, Mat, Options, balancing, structure};
 
 /// The shape of one block of F(x).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,12 +161,14 @@ impl Sdp {
                 entries.iter().for_each(|e| rows[e.row].push((e.unknown, e.value)));
                 return Block::Diagonal(DiagonalBlock::new(constant, rows));
             }
-            Block::Dense(DenseBlock {
-                size,
-                constant,
-                factored: Factored::default(),
-                sparse: Sparse::new(size, entries),
-            })
+            let coefficients = merge(entries);
+            let factored = structure::stacks(size, &coefficients).map(|stacks| Factored::new(size, stacks));
+            let sparse = Sparse::of_coefficients(size, coefficients);
+            let (factored, sparse) = match factored {
+                Some(factored) if factored.cost() < sparse.cost => (factored, Sparse::default()),
+                _ => (Factored::default(), sparse),
+            };
+            Block::Dense(DenseBlock { size, constant, factored, sparse })
         });
         let scale = vec![1.0; self.objective.len()];
         Program { objective: self.objective.clone(), blocks: blocks.collect(), scale, omega: 1.0, balanced: false }

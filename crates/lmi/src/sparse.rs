@@ -41,6 +41,31 @@ pub(crate) struct Sparse {
     coefficients: Vec<Coefficient>,
     /// All entries in that order, as ⟨F, H⟩ for symmetric H needs them: (place in the lower triangle of H, value, doubled off the diagonal).
     weights: Vec<(u32, f64)>,
+    /// Operations that a Schur complement takes, roughly.
+    pub cost: usize,
+}
+
+/// The coefficient matrix of each unknown that has one, as (row, column, value), row ≥ column, by rising column and row.
+pub(crate) type Coefficients = Vec<(usize, Vec<(usize, usize, f64)>)>;
+
+/// Gathers entries in any order; repeated entries add up.
+pub(crate) fn merge(mut entries: Vec<Entry>) -> Coefficients {
+    entries.sort_by_key(|e| (e.unknown, e.column, e.row));
+    let mut coefficients: Coefficients = Vec::new();
+    for group in entries.chunk_by(|a, b| a.unknown == b.unknown) {
+        let mut merged: Vec<(usize, usize, f64)> = Vec::with_capacity(group.len());
+        for e in group {
+            match merged.last_mut() {
+                Some(last) if (last.0, last.1) == (e.row, e.column) => last.2 += e.value,
+                _ => merged.push((e.row, e.column, e.value)),
+            }
+        }
+        merged.retain(|e| e.2 != 0.0);
+        if !merged.is_empty() {
+            coefficients.push((group[0].unknown, merged));
+        }
+    }
+    coefficients
 }
 
 /// What is done with each product H of a block that is not sparse alone.
@@ -56,49 +81,44 @@ pub(crate) struct SparseScratch {
 
 impl Sparse {
     /// From entries in any order; repeated entries add up.
-    pub fn new(n: usize, mut entries: Vec<Entry>) -> Self {
-        entries.sort_by_key(|e| (e.unknown, e.column, e.row));
+    pub fn new(n: usize, entries: Vec<Entry>) -> Self {
+        Self::of_coefficients(n, merge(entries))
+    }
+
+    /// From coefficient matrices.
+    pub fn of_coefficients(n: usize, merged: Coefficients) -> Self {
         let mut coefficients: Vec<Coefficient> = Vec::new();
-        for group in entries.chunk_by(|a, b| a.unknown == b.unknown) {
-            let mut merged: Vec<(usize, usize, f64)> = Vec::new();
-            for e in group {
-                match merged.last_mut() {
-                    Some(last) if (last.0, last.1) == (e.row, e.column) => last.2 += e.value,
-                    _ => merged.push((e.row, e.column, e.value)),
-                }
-            }
-            merged.retain(|e| e.2 != 0.0);
-            if merged.is_empty() {
-                continue;
-            }
-            let mut support: Vec<usize> = merged.iter().flat_map(|e| [e.0, e.1]).collect();
+        for (unknown, entries) in merged {
+            let mut support: Vec<usize> = entries.iter().flat_map(|e| [e.0, e.1]).collect();
             support.sort_unstable();
             support.dedup();
             let place = |row: usize| support.binary_search(&row).unwrap_or(0);
             let mut full = Vec::new();
-            for &(i, j, value) in &merged {
+            for &(i, j, value) in &entries {
                 full.push((place(i), j, value));
                 if i != j {
                     full.push((place(j), i, value));
                 }
             }
-            let unknown = group[0].unknown;
-            coefficients.push(Coefficient { unknown, entries: merged, support, full, start: 0, whole: false });
+            coefficients.push(Coefficient { unknown, entries, support, full, start: 0, whole: false });
         }
         coefficients.sort_by_key(|c| std::cmp::Reverse(c.entries.len()));
         let mut remaining: usize = coefficients.iter().map(|c| c.entries.len()).sum();
         let mut weights = Vec::with_capacity(remaining);
+        let mut cost = 0;
         for c in &mut coefficients {
             let k = c.support.len();
             // Operations, those of the dense product counted by vectors of about six.
-            c.whole = n * n * (k + 6) / 6 + remaining < 2 * k * remaining;
+            let (whole, entrywise) = (n * n * (k + 6) / 6 + remaining, 2 * k * remaining);
+            c.whole = whole < entrywise;
+            cost += c.full.len() * n / 6 + whole.min(entrywise);
             remaining -= c.entries.len();
             c.start = weights.len();
             let weight =
                 |&(i, j, value): &(usize, usize, f64)| ((i + j * n) as u32, if i == j { value } else { 2.0 * value });
             weights.extend(c.entries.iter().map(weight));
         }
-        Self { n, coefficients, weights }
+        Self { n, coefficients, weights, cost }
     }
 
     pub fn is_empty(&self) -> bool {
