@@ -1,5 +1,6 @@
 //! The solver's form of a problem: minimise cᵀx subject to `F_b(x) = C_b + Σ xᵢ F_{b,i} ⪰ 0`.
 
+use crate::assembly::Assembly;
 use crate::factored::{Factored, FactoredScratch};
 use crate::sparse::{Sparse, SparseScratch};
 
@@ -191,13 +192,23 @@ impl Block {
         }
     }
 
-    /// M ← M + tr(F_i P F_j Z), lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
-    pub fn schur(&self, p: &[f64], z: &[f64], m: &mut [f64], unknowns: usize, scratch: &mut OperatorScratch) {
+    /// Adds tr(F_i P F_j Z) to M, lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`. What is due to the factored part alone is left to
+    /// the assembly, which takes over P and Z for that.
+    pub fn schur(
+        &self,
+        index: usize,
+        [p, z]: [&[f64]; 2],
+        assembly: &mut Assembly,
+        m: &mut [f64],
+        unknowns: usize,
+        scratch: &mut OperatorScratch,
+    ) {
         match self {
             Self::Dense(block) => {
                 let OperatorScratch { factored, sparse, mixed } = scratch;
-                if !block.factored.is_empty() {
-                    block.factored.schur(p, z, m, unknowns, factored);
+                let alone = block.factored.is_empty();
+                if !alone {
+                    assembly.project(index, &block.factored, p, z);
                 }
                 let mut meet_factored = |unknown: usize, h: &[f64], m: &mut [f64]| {
                     mixed.fill(0.0);
@@ -208,7 +219,6 @@ impl Block {
                         m[other.max(unknown) + other.min(unknown) * unknowns] += value;
                     }
                 };
-                let alone = block.factored.is_empty();
                 let mixed = (!alone).then_some(&mut meet_factored as crate::sparse::Mixed<'_>);
                 block.sparse.schur(p, z, m, unknowns, sparse, mixed);
             }

@@ -1,18 +1,19 @@
 //! Dense kernels on symmetric and triangular matrices, n × n, column by column in a slice.
 
+use crate::small;
 use crate::vectorized::vectorized;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul as faer_matmul;
 use faer::{Accum, MatMut, MatRef, Par, Spec};
 
-/// Up to this size plain column loops beat the blocked algorithms' set-up.
-const SMALL: usize = 40;
+/// Up to this size plain loops beat the blocked algorithms' set-up.
+const SMALL: usize = small::MOST;
 
 /// Scratch memory for the factorisations.
 pub(crate) struct Scratch {
     buffer: MemBuffer,
-    matrix: Vec<f64>,
+    padded: Vec<f64>,
 }
 
 impl Scratch {
@@ -21,12 +22,16 @@ impl Scratch {
         let factor = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
         let inverse = llt::inverse::inverse_scratch::<f64>(n, Par::Seq);
         let solve = llt::solve::solve_in_place_scratch::<f64>(n, 1, Par::Seq);
-        Self { buffer: MemBuffer::new(factor.or(inverse).or(solve)), matrix: vec![0.0; SMALL * SMALL] }
+        Self { buffer: MemBuffer::new(factor.or(inverse).or(solve)), padded: small::scratch() }
     }
 }
 
 /// c = a · b.
-pub(crate) fn multiply(n: usize, a: &[f64], b: &[f64], c: &mut [f64]) {
+pub(crate) fn multiply(n: usize, a: &[f64], b: &[f64], c: &mut [f64], scratch: &mut Scratch) {
+    if n <= SMALL {
+        small::multiply(n, a, b, c, &mut scratch.padded);
+        return;
+    }
     faer_matmul(
         MatMut::from_column_major_slice_mut(c, n, n),
         Accum::Replace,
@@ -101,36 +106,7 @@ pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], scratch:
         mirror_lower(n, out);
         return;
     }
-    inverse_by_columns(n, l, &mut scratch.matrix[..n * n], out);
-}
-
-vectorized! {
-    fn inverse_by_columns<'a>(n: usize, l: &'a [f64], transposed: &'a mut [f64], out: &'a mut [f64]) {
-        // L⁻¹ column by column, kept as rows of its transpose so that the product below runs down columns.
-        let mut x = [0.0; SMALL];
-        for j in 0..n {
-            x[j..n].fill(0.0);
-            x[j] = 1.0;
-            for k in j..n {
-                let column = &l[k * n..(k + 1) * n];
-                let value = x[k] / column[k];
-                x[k] = value;
-                axpy(-value, &column[k + 1..], &mut x[k + 1..n]);
-                transposed[j + k * n] = value;
-            }
-        }
-        out.fill(0.0);
-        for (k, column) in transposed.chunks_exact(n).enumerate() {
-            for j in 0..=k {
-                axpy(
-                    column[j],
-                    &column[j..=k],
-                    &mut out[j * n + j..j * n + k + 1],
-                );
-            }
-        }
-        mirror_lower(n, out);
-    }
+    small::inverse_from_factor(n, l, out, &mut scratch.padded);
 }
 
 /// Copies the lower triangle to the upper one.
@@ -156,11 +132,41 @@ pub(crate) fn symmetrize(n: usize, a: &mut [f64]) {
 
 /// y = A x for a symmetric (or column-wise given) matrix A.
 #[inline(always)]
-pub(crate) fn apply(n: usize, a: &[f64], x: &[f64], y: &mut [f64]) {
-    y.fill(0.0);
-    for (column, &x) in a.chunks_exact(n).zip(x) {
-        axpy(x, column, y);
+pub(crate) fn apply<S: pulp::Simd>(simd: S, n: usize, a: &[f64], x: &[f64], y: &mut [f64]) {
+    let whole = n / S::F64_LANES * S::F64_LANES;
+    let mut row = 0;
+    // Four vectors of y stay in registers while the columns pass.
+    while row + 4 * S::F64_LANES <= whole {
+        rows::<S, 4>(simd, n, a, x, row, y);
+        row += 4 * S::F64_LANES;
     }
+    while row + S::F64_LANES <= whole {
+        rows::<S, 1>(simd, n, a, x, row, y);
+        row += S::F64_LANES;
+    }
+    if row < n {
+        let mut sum = simd.splat_f64s(0.0);
+        for (column, x) in a.chunks_exact(n).zip(x) {
+            sum = simd.mul_add_e_f64s(simd.partial_load_f64s(&column[row..]), simd.splat_f64s(*x), sum);
+        }
+        simd.partial_store_f64s(&mut y[row..n], sum);
+    }
+}
+
+/// M vectors of A x, from `row` on.
+#[inline(always)]
+fn rows<S: pulp::Simd, const M: usize>(simd: S, n: usize, a: &[f64], x: &[f64], row: usize, y: &mut [f64]) {
+    let end = row + M * S::F64_LANES;
+    let mut sums = [simd.splat_f64s(0.0); M];
+    for (column, x) in a.chunks_exact(n).zip(x) {
+        let (column, _) = S::as_simd_f64s(&column[row..end]);
+        let x = simd.splat_f64s(*x);
+        for (sum, entry) in sums.iter_mut().zip(column) {
+            *sum = simd.mul_add_e_f64s(*entry, x, *sum);
+        }
+    }
+    let (target, _) = S::as_mut_simd_f64s(&mut y[row..end]);
+    target.copy_from_slice(&sums);
 }
 
 /// y ← y + factor · x.
@@ -212,7 +218,7 @@ mod tests {
                 }
             }
             let mut product = vec![0.0; n * n];
-            multiply(n, &a, &inverse, &mut product);
+            multiply(n, &a, &inverse, &mut product, &mut scratch);
             (0..n).for_each(|i| product[i + i * n] -= 1.0);
             assert!(norm(&product) < 1e-13);
         }

@@ -108,7 +108,7 @@ impl BlockState {
     }
 
     /// G of the predictor: −sym(P R Z), zero when there is no residual.
-    pub fn begin_predictor(&mut self, feasible: bool) {
+    pub fn begin_predictor(&mut self, feasible: bool, scratch: &mut Scratch) {
         if feasible {
             self.g.fill(0.0);
             return;
@@ -119,21 +119,21 @@ impl BlockState {
             }
             return;
         }
-        dense::multiply(self.n, &self.s_inverse, &self.residual, &mut self.work);
-        dense::multiply(self.n, &self.work, &self.z, &mut self.g);
+        dense::multiply(self.n, &self.s_inverse, &self.residual, &mut self.work, scratch);
+        dense::multiply(self.n, &self.work, &self.z, &mut self.g, scratch);
         dense::symmetrize(self.n, &mut self.g);
         self.g.iter_mut().for_each(|g| *g = -*g);
     }
 
     /// G of the corrector: adds σμ P − sym(P dSₐ dZₐ) to the predictor's G, for the predictor step in `ds`, `dz`.
-    pub fn begin_corrector(&mut self, sigma_mu: f64) {
+    pub fn begin_corrector(&mut self, sigma_mu: f64, scratch: &mut Scratch) {
         if self.diagonal {
             for i in 0..self.g.len() {
                 self.g[i] += self.s_inverse[i] * (sigma_mu - self.ds[i] * self.dz[i]);
             }
             return;
         }
-        dense::multiply(self.n, &self.p_ds, &self.dz, &mut self.work);
+        dense::multiply(self.n, &self.p_ds, &self.dz, &mut self.work, scratch);
         dense::symmetrize(self.n, &mut self.work);
         for ((g, p), w) in self.g.iter_mut().zip(&self.s_inverse).zip(&self.work) {
             *g += sigma_mu * p - w;
@@ -146,7 +146,7 @@ impl BlockState {
     }
 
     /// dS and dZ from dx.
-    pub fn complete(&mut self, block: &Block, dx: &[f64], feasible: bool) {
+    pub fn complete(&mut self, block: &Block, dx: &[f64], feasible: bool, scratch: &mut Scratch) {
         self.ds.fill(0.0);
         block.apply(dx, &mut self.ds, &mut self.operator);
         if self.diagonal {
@@ -156,15 +156,15 @@ impl BlockState {
             }
             return;
         }
-        dense::multiply(self.n, &self.s_inverse, &self.ds, &mut self.p_ds);
-        dense::multiply(self.n, &self.p_ds, &self.z, &mut self.dz);
+        dense::multiply(self.n, &self.s_inverse, &self.ds, &mut self.p_ds, scratch);
+        dense::multiply(self.n, &self.p_ds, &self.z, &mut self.dz, scratch);
         dense::symmetrize(self.n, &mut self.dz);
         for ((dz, g), z) in self.dz.iter_mut().zip(&self.g).zip(&self.z) {
             *dz = g - z - *dz;
         }
         if !feasible {
             self.ds.iter_mut().zip(&self.residual).for_each(|(ds, r)| *ds += r);
-            dense::multiply(self.n, &self.s_inverse, &self.ds, &mut self.p_ds);
+            dense::multiply(self.n, &self.s_inverse, &self.ds, &mut self.p_ds, scratch);
         }
     }
 
@@ -176,7 +176,7 @@ impl BlockState {
 
     /// dS and dZ for a small change of dx. Added to what is there rather than formed anew, so that rounding errors
     /// are relative to the change.
-    pub fn refine(&mut self, block: &Block, change: &[f64]) {
+    pub fn refine(&mut self, block: &Block, change: &[f64], scratch: &mut Scratch) {
         self.work.fill(0.0);
         block.apply(change, &mut self.work, &mut self.operator);
         dense::axpy(1.0, &self.work, &mut self.ds);
@@ -186,8 +186,8 @@ impl BlockState {
             }
             return;
         }
-        dense::multiply(self.n, &self.s_inverse, &self.work, &mut self.product);
-        dense::multiply(self.n, &self.product, &self.z, &mut self.work);
+        dense::multiply(self.n, &self.s_inverse, &self.work, &mut self.product, scratch);
+        dense::multiply(self.n, &self.product, &self.z, &mut self.work, scratch);
         dense::symmetrize(self.n, &mut self.work);
         dense::axpy(-1.0, &self.work, &mut self.dz);
     }

@@ -53,49 +53,22 @@ impl Columns {
 
 /// A stack: U is columns `u..u + rows` of W, V is columns `v..v + cols`.
 #[derive(Debug)]
-struct Group {
-    u: usize,
-    rows: usize,
-    v: usize,
-    cols: usize,
-    positions: Vec<usize>,
-    places: Vec<Places>,
-}
-
-/// Where the entries of one row of X stand among the unknowns.
-#[derive(Clone, Copy, Debug)]
-enum Places {
-    /// One after the other, from here.
-    Run(usize),
-    /// Anywhere up to here.
-    Scattered(usize),
-}
-
-impl Places {
-    fn of(positions: &[usize]) -> Self {
-        let first = positions[0];
-        if first != NO_UNKNOWN && positions.iter().enumerate().all(|(s, &position)| position == first + s) {
-            return Self::Run(first);
-        }
-        Self::Scattered(positions.iter().copied().filter(|&at| at != NO_UNKNOWN).max().unwrap_or(0))
-    }
-
-    fn last(self, cols: usize) -> usize {
-        match self {
-            Self::Run(first) => first + cols - 1,
-            Self::Scattered(last) => last,
-        }
-    }
+pub(crate) struct Group {
+    pub u: usize,
+    pub rows: usize,
+    pub v: usize,
+    pub cols: usize,
+    pub positions: Vec<usize>,
 }
 
 /// A row of the Schur complement that a group contributes to: the entries of X that are one scalar unknown
 /// (two for a symmetric unknown off the diagonal).
 #[derive(Debug)]
-struct Row {
-    position: usize,
-    group: usize,
-    entries: [(usize, usize); 2],
-    count: usize,
+pub(crate) struct Row {
+    pub position: usize,
+    pub group: usize,
+    pub entries: [(usize, usize); 2],
+    pub count: usize,
 }
 
 /// The factored part of a block.
@@ -108,18 +81,12 @@ pub(crate) struct Factored {
 }
 
 /// Rows are padded to a multiple of this, at least the widest vector register.
-const PADDING: usize = 8;
+pub(crate) const PADDING: usize = 8;
 
 /// Scratch memory of one block's factored part, reused in every iteration.
 #[derive(Debug, Default)]
 pub(crate) struct FactoredScratch {
     product: Vec<f64>,
-    wpw: Vec<f64>,
-    wzw: Vec<f64>,
-    /// The two sides of a sum of outer products, and the sum.
-    factors: Vec<f64>,
-    lines: Vec<f64>,
-    sum: Vec<f64>,
 }
 
 impl Factored {
@@ -149,8 +116,7 @@ impl Factored {
                     }
                 }
             }
-            let places = stack.positions.chunks(cols).map(Places::of).collect();
-            groups.push(Group { u, rows: count, v, cols, positions: stack.positions, places });
+            groups.push(Group { u, rows: count, v, cols, positions: stack.positions });
         }
         Self { n, w, groups, rows }
     }
@@ -172,17 +138,31 @@ impl Factored {
     }
 
     pub fn scratch(&self) -> FactoredScratch {
-        let w = self.w.len();
-        let rows = self.groups.iter().map(|g| g.rows).max().unwrap_or(0);
-        let cols = self.groups.iter().map(|g| g.cols.next_multiple_of(PADDING)).max().unwrap_or(0);
-        FactoredScratch {
-            product: vec![0.0; self.n * w],
-            wpw: vec![0.0; w * w],
-            wzw: vec![0.0; w * w],
-            factors: vec![0.0; 8 * rows],
-            lines: vec![0.0; 8 * cols],
-            sum: vec![0.0; rows * cols],
-        }
+        let widest = self.groups.iter().map(|g| g.cols).max().unwrap_or(0);
+        FactoredScratch { product: vec![0.0; self.n * widest.max(1)] }
+    }
+
+    /// Rows of the block.
+    pub fn size(&self) -> usize {
+        self.n
+    }
+
+    /// Columns of W.
+    pub fn columns(&self) -> usize {
+        self.w.len()
+    }
+
+    pub fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// WᵀHW for symmetric H, row by row.
+    pub fn project(&self, h: &[f64], product: &mut [f64], out: &mut [f64]) {
+        project(self.n, &self.w, h, &mut product[..self.n * self.w.len()], out);
     }
 
     /// out ← out + F(x) − F(0).
@@ -229,113 +209,6 @@ impl Factored {
                     *out = out.max(norm);
                 }
             }
-        }
-    }
-
-    /// M ← M + tr(F_i P F_j Z), lower triangle (j ≤ i stored at `m[i + j·N]`).
-    pub fn schur(&self, p: &[f64], z: &[f64], m: &mut [f64], unknowns: usize, scratch: &mut FactoredScratch) {
-        project(self.n, &self.w, p, &mut scratch.product, &mut scratch.wpw);
-        project(self.n, &self.w, z, &mut scratch.product, &mut scratch.wzw);
-        pulp::Arch::new().dispatch(SchurRows { factored: self, m, unknowns, scratch });
-    }
-}
-
-/// The rows of the Schur complement from `WᵀPW` and `WᵀZW`.
-struct SchurRows<'a> {
-    factored: &'a Factored,
-    m: &'a mut [f64],
-    unknowns: usize,
-    scratch: &'a mut FactoredScratch,
-}
-
-impl pulp::WithSimd for SchurRows<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let Self { factored, m, unknowns, scratch } = self;
-        let FactoredScratch { wpw, wzw, factors, lines, sum, .. } = scratch;
-        let w = factored.w.len();
-        for row in &factored.rows {
-            let target = &mut m[row.position * unknowns..(row.position + 1) * unknowns];
-            let g = &factored.groups[row.group];
-            for h in &factored.groups {
-                let padded = h.cols.next_multiple_of(PADDING);
-                let terms = 4 * row.count;
-                let lines = &mut lines[..terms * padded];
-                let factors = &mut factors[..terms * h.rows];
-                for (e, &(p, q)) in row.entries[..row.count].iter().enumerate() {
-                    let (up, vq) = ((g.u + p) * w, (g.v + q) * w);
-                    // (v_qᵀPu_r)(v_sᵀZu_p) + (v_qᵀPv_s)(u_rᵀZu_p) + (u_pᵀPu_r)(v_sᵀZv_q) + (u_pᵀPv_s)(u_rᵀZv_q)
-                    let left = [&wpw[vq..], &wzw[up..], &wpw[up..], &wzw[vq..]];
-                    let right = [&wzw[up..], &wpw[vq..], &wzw[vq..], &wpw[up..]];
-                    for (k, (left, right)) in left.into_iter().zip(right).enumerate() {
-                        let k = 4 * e + k;
-                        lines[k * padded..k * padded + h.cols].copy_from_slice(&right[h.v..h.v + h.cols]);
-                        for (r, value) in left[h.u..h.u + h.rows].iter().enumerate() {
-                            factors[r * terms + k] = *value;
-                        }
-                    }
-                }
-                let sum = &mut sum[..h.rows * padded];
-                if row.count == 1 {
-                    outer_products::<S, 4>(simd, h, row.position, factors, lines, sum);
-                } else {
-                    outer_products::<S, 8>(simd, h, row.position, factors, lines, sum);
-                }
-                add_from(h, row.position, padded, sum, target);
-            }
-        }
-    }
-}
-
-/// sum ← factors · lines for the rows of X that reach beyond `position`, K terms.
-#[inline(always)]
-fn outer_products<S: pulp::Simd, const K: usize>(
-    simd: S,
-    h: &Group,
-    position: usize,
-    factors: &[f64],
-    lines: &[f64],
-    sum: &mut [f64],
-) {
-    let (lines, _) = S::as_simd_f64s(lines);
-    let (sum, _) = S::as_mut_simd_f64s(sum);
-    let width = lines.len() / K;
-    for c in 0..width {
-        let line: [S::f64s; K] = std::array::from_fn(|k| lines[k * width + c]);
-        for ((factors, sum), places) in factors.chunks_exact(K).zip(sum.chunks_exact_mut(width)).zip(&h.places) {
-            if places.last(h.cols) < position {
-                continue;
-            }
-            let mut total = simd.mul_f64s(simd.splat_f64s(factors[0]), line[0]);
-            for k in 1..K {
-                total = simd.mul_add_e_f64s(simd.splat_f64s(factors[k]), line[k], total);
-            }
-            sum[c] = total;
-        }
-    }
-}
-
-/// Adds the entries of `sum` from `position` on to a row of the Schur complement.
-#[inline(always)]
-fn add_from(h: &Group, position: usize, padded: usize, sum: &[f64], target: &mut [f64]) {
-    for (r, (places, sum)) in h.places.iter().zip(sum.chunks_exact(padded)).enumerate() {
-        match *places {
-            Places::Run(first) => {
-                let skip = position.saturating_sub(first);
-                if skip < h.cols {
-                    axpy(1.0, &sum[skip..h.cols], &mut target[first + skip..first + h.cols]);
-                }
-            }
-            Places::Scattered(last) if last >= position => {
-                for (&at, value) in h.positions[r * h.cols..(r + 1) * h.cols].iter().zip(sum) {
-                    if at >= position && at != NO_UNKNOWN {
-                        target[at] += value;
-                    }
-                }
-            }
-            Places::Scattered(_) => {}
         }
     }
 }

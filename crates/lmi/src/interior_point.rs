@@ -7,6 +7,7 @@
 mod certificate;
 
 use crate::answer::{InaccurateReason, IterationLog, Residuals};
+use crate::assembly::Assembly;
 use crate::block::{Block, Program};
 use crate::dense::{Scratch, dot, norm};
 use crate::direction::BlockState;
@@ -80,6 +81,7 @@ struct Iteration<'a> {
     x: Vec<f64>,
     /// A(Z).
     az: Vec<f64>,
+    assembly: Assembly,
     schur: Schur,
     /// The matrix of A(F(y)), factorised when first needed.
     gram: Option<Schur>,
@@ -228,6 +230,7 @@ impl<'a> Iteration<'a> {
             options,
             x: vec![0.0; unknowns],
             az: vec![0.0; unknowns],
+            assembly: Assembly::new(operators),
             schur: Schur::new(unknowns),
             gram: None,
             scratch: Scratch::new(largest),
@@ -310,11 +313,12 @@ impl<'a> Iteration<'a> {
     fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
         let unknowns = self.x.len();
         self.schur.matrix.fill(0.0);
-        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
+        for (index, (state, block)) in self.blocks.iter_mut().zip(self.operators).enumerate() {
             state.invert(&mut self.scratch);
             let BlockState { s_inverse, z, operator, .. } = state;
-            block.schur(s_inverse, z, &mut self.schur.matrix, unknowns, operator);
+            block.schur(index, [s_inverse, z], &mut self.assembly, &mut self.schur.matrix, unknowns, operator);
         }
+        self.assembly.add(&mut self.schur.matrix, unknowns);
         self.schur.scale_by(self.scale);
         let (mut sigma, mut primal, mut dual);
         let mut regularization = 0.0;
@@ -345,7 +349,7 @@ impl<'a> Iteration<'a> {
     /// The predictor, then the corrector's direction: (centring, primal step, dual step of the predictor).
     fn predict_and_correct(&mut self, status: &Status) -> (f64, f64, f64) {
         let feasible = self.feasible;
-        self.blocks.iter_mut().for_each(|state| state.begin_predictor(feasible));
+        self.blocks.iter_mut().for_each(|state| state.begin_predictor(feasible, &mut self.scratch));
         self.direction();
         let (primal, dual) = self.longest_steps(0.3);
         let (primal, dual) = (primal.min(1.0), dual.min(1.0));
@@ -353,7 +357,7 @@ impl<'a> Iteration<'a> {
         let ratio = (reached / status.mu).clamp(0.0, 1.0);
         let exponent = (3.0 * primal.min(dual).powi(2)).max(1.0);
         let sigma = ratio.powf(exponent).clamp(1e-6, 1.0);
-        self.blocks.iter_mut().for_each(|state| state.begin_corrector(sigma * status.mu));
+        self.blocks.iter_mut().for_each(|state| state.begin_corrector(sigma * status.mu, &mut self.scratch));
         self.direction();
         (sigma, primal, dual)
     }
@@ -369,7 +373,7 @@ impl<'a> Iteration<'a> {
         self.schur.solve(&self.right_side, &mut self.dx);
         product(self.scale, &self.dx, &mut self.unscaled);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-            state.complete(block, &self.unscaled, self.feasible);
+            state.complete(block, &self.unscaled, self.feasible, &mut self.scratch);
         }
     }
 
@@ -399,7 +403,7 @@ impl<'a> Iteration<'a> {
             crate::dense::axpy(1.0, &self.change, &mut self.dx);
             product(self.scale, &self.change, &mut self.unscaled);
             for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-                state.refine(block, &self.unscaled);
+                state.refine(block, &self.unscaled, &mut self.scratch);
             }
         }
         last

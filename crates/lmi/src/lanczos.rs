@@ -5,7 +5,6 @@
 //! two matrix-vector products a step, no eigendecomposition. (Toh, SIAM J. Optim. 12, 2002, for the bound.)
 
 use crate::dense::{apply, axpy, dot};
-use crate::vectorized::vectorized;
 
 /// Most steps of one estimate. The result is safe-guarded by a Cholesky factorisation, so that few suffice.
 const STEPS: usize = 30;
@@ -29,34 +28,33 @@ impl Lanczos {
     ///
     /// Given are S itself, its inverse and D, symmetric n × n.
     pub fn step(&mut self, n: usize, s: &[f64], s_inverse: &[f64], d: &[f64], accuracy: f64) -> f64 {
-        longest_step(self, n, s, s_inverse, d, accuracy)
+        pulp::Arch::new().dispatch(LongestStep { lanczos: self, n, s, s_inverse, d, accuracy })
     }
 }
 
-vectorized! {
-    fn longest_step<'a>(
-        lanczos: &'a mut Lanczos,
-        n: usize,
-        s: &'a [f64],
-        s_inverse: &'a [f64],
-        d: &'a [f64],
-        accuracy: f64,
-    ) -> f64 {
-        let Lanczos {
-            v,
-            sv,
-            sv_before,
-            w,
-            u,
-        } = lanczos;
+struct LongestStep<'a> {
+    lanczos: &'a mut Lanczos,
+    n: usize,
+    s: &'a [f64],
+    s_inverse: &'a [f64],
+    d: &'a [f64],
+    accuracy: f64,
+}
+
+impl pulp::WithSimd for LongestStep<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> f64 {
+        let Self { lanczos, n, s, s_inverse, d, accuracy } = self;
+        let Lanczos { v, sv, sv_before, w, u } = lanczos;
         let (v, sv, sv_before) = (&mut v[..n], &mut sv[..n], &mut sv_before[..n]);
         let (w, u) = (&mut w[..n], &mut u[..n]);
         // A fixed start without pattern.
         for (i, v) in v.iter_mut().enumerate() {
-            *v = 1.0 + 0.5 * ((i * i + 3 * i + 1) % 7) as f64 / 7.0
-                - if i % 2 == 1 { 0.3 } else { 0.0 };
+            *v = 1.0 + 0.5 * ((i * i + 3 * i + 1) % 7) as f64 / 7.0 - if i % 2 == 1 { 0.3 } else { 0.0 };
         }
-        apply(n, s, v, sv);
+        apply(simd, n, s, v, sv);
         let length = dot(v, sv).sqrt();
         if !(length > 0.0 && length.is_finite()) {
             return 0.0;
@@ -66,13 +64,13 @@ vectorized! {
         let (mut alphas, mut betas) = ([0.0; STEPS], [0.0; STEPS]);
         let mut smallest = f64::NAN;
         for k in 0..STEPS.min(n) {
-            apply(n, d, v, w);
+            apply(simd, n, d, v, w);
             if k > 0 {
                 axpy(-betas[k - 1], sv_before, w);
             }
             let alpha = dot(w, v);
             axpy(-alpha, sv, w);
-            apply(n, s_inverse, w, u);
+            apply(simd, n, s_inverse, w, u);
             let square = dot(u, w);
             if !(alpha.is_finite() && square.is_finite()) {
                 return 0.0;
@@ -86,27 +84,16 @@ vectorized! {
                 // Some eigenvalue lies within `residual` of the Ritz value.
                 let residual = if k + 1 == n { 0.0 } else { beta * component };
                 smallest = value - residual;
-                if last
-                    || residual <= accuracy * value.abs()
-                    || (value > -1e-1 && value - residual > -0.5)
-                {
+                if last || residual <= accuracy * value.abs() || (value > -1e-1 && value - residual > -0.5) {
                     break;
                 }
             }
             sv_before.copy_from_slice(sv);
             let inverse = 1.0 / beta;
-            v.iter_mut()
-                .zip(u.iter())
-                .for_each(|(v, u)| *v = u * inverse);
-            sv.iter_mut()
-                .zip(w.iter())
-                .for_each(|(sv, w)| *sv = w * inverse);
+            v.iter_mut().zip(u.iter()).for_each(|(v, u)| *v = u * inverse);
+            sv.iter_mut().zip(w.iter()).for_each(|(sv, w)| *sv = w * inverse);
         }
-        if smallest < 0.0 {
-            -1.0 / smallest
-        } else {
-            f64::INFINITY
-        }
+        if smallest < 0.0 { -1.0 / smallest } else { f64::INFINITY }
     }
 }
 

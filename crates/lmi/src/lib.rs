@@ -51,6 +51,7 @@
 //! best point with its residuals. [`Error`] is for problems that have no meaning. The [`guide`] has a page on each.
 
 mod answer;
+mod assembly;
 mod balancing;
 mod block;
 mod dense;
@@ -71,6 +72,7 @@ mod report;
 mod rigorous;
 mod schur;
 pub mod sdpa;
+mod small;
 mod sparse;
 mod start;
 mod structure;

@@ -89,10 +89,12 @@ impl Iteration<'_> {
         if self.gram.is_none() {
             let unknowns = self.x.len();
             let mut gram = Schur::new(unknowns);
-            for (state, block) in self.blocks.iter_mut().zip(self.operators) {
+            for (index, (state, block)) in self.blocks.iter_mut().zip(self.operators).enumerate() {
                 let identity = state.identity();
-                block.schur(&identity, &identity, &mut gram.matrix, unknowns, &mut state.operator);
+                let matrix = &mut gram.matrix;
+                block.schur(index, [&identity; 2], &mut self.assembly, matrix, unknowns, &mut state.operator);
             }
+            self.assembly.add(&mut gram.matrix, unknowns);
             gram.scale_by(self.scale);
             if !gram.factorize(0.0) {
                 return None;

@@ -1,0 +1,197 @@
+//! Kernels on matrices of up to [`MOST`] rows, whose columns fit a few vector registers. Column by column in slices; inner loops run
+//! over columns that are padded to whole vectors.
+
+use crate::dense::mirror_lower;
+
+/// Most rows.
+pub(crate) const MOST: usize = 40;
+/// Columns are padded to a multiple of this, at least the widest vector register.
+const PADDING: usize = 8;
+
+/// Scratch memory, n padded columns.
+pub(crate) fn scratch() -> Vec<f64> {
+    vec![0.0; MOST * MOST.next_multiple_of(PADDING)]
+}
+
+/// c = a · b.
+pub(crate) fn multiply(n: usize, a: &[f64], b: &[f64], c: &mut [f64], padded: &mut [f64]) {
+    pulp::Arch::new().dispatch(Multiply { n, a, b, c, padded });
+}
+
+/// (L Lᵀ)⁻¹ as a full symmetric matrix, from the lower triangle L.
+pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], padded: &mut [f64]) {
+    pulp::Arch::new().dispatch(Inverse { n, l, out, padded });
+}
+
+struct Multiply<'a> {
+    n: usize,
+    a: &'a [f64],
+    b: &'a [f64],
+    c: &'a mut [f64],
+    padded: &'a mut [f64],
+}
+
+impl pulp::WithSimd for Multiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self { n, a, b, c, padded } = self;
+        let stride = n.next_multiple_of(PADDING);
+        for (to, from) in padded.chunks_exact_mut(stride).zip(a.chunks_exact(n)) {
+            to[..n].copy_from_slice(from);
+            to[n..].fill(0.0);
+        }
+        let (columns, _) = S::as_simd_f64s(&padded[..n * stride]);
+        let height = stride / S::F64_LANES;
+        // As many accumulators as there are registers for.
+        let panel = if S::F64_LANES == 8 { 4 } else { 3 };
+        for first in (0..height).step_by(panel) {
+            let rows = panel.min(height - first);
+            let panel = Panel { n, height, first, columns };
+            let mut column = 0;
+            while column + 4 <= n {
+                panel.multiply_rows::<S, 4>(simd, rows, b, column, c);
+                column += 4;
+            }
+            while column < n {
+                panel.multiply_rows::<S, 1>(simd, rows, b, column, c);
+                column += 1;
+            }
+        }
+    }
+}
+
+/// Some vectors of every column of a matrix.
+struct Panel<'a, V> {
+    n: usize,
+    /// Vectors in a column.
+    height: usize,
+    first: usize,
+    columns: &'a [V],
+}
+
+impl<V: Copy> Panel<'_, V> {
+    #[inline(always)]
+    fn multiply_rows<S: pulp::Simd<f64s = V>, const N: usize>(
+        &self,
+        simd: S,
+        rows: usize,
+        b: &[f64],
+        column: usize,
+        c: &mut [f64],
+    ) {
+        match rows {
+            1 => self.multiply::<S, 1, N>(simd, b, column, c),
+            2 => self.multiply::<S, 2, N>(simd, b, column, c),
+            3 => self.multiply::<S, 3, N>(simd, b, column, c),
+            _ => self.multiply::<S, 4, N>(simd, b, column, c),
+        }
+    }
+
+    /// M vectors of N columns of the product, from `column` on.
+    #[inline(always)]
+    fn multiply<S: pulp::Simd<f64s = V>, const M: usize, const N: usize>(
+        &self,
+        simd: S,
+        b: &[f64],
+        column: usize,
+        c: &mut [f64],
+    ) {
+        let n = self.n;
+        let right: [&[f64]; N] = std::array::from_fn(|j| &b[(column + j) * n..(column + j + 1) * n]);
+        let mut sums = [[simd.splat_f64s(0.0); M]; N];
+        for (k, vectors) in self.columns.chunks_exact(self.height).enumerate() {
+            let left: [V; M] = std::array::from_fn(|i| vectors[self.first + i]);
+            for j in 0..N {
+                let factor = simd.splat_f64s(right[j][k]);
+                for i in 0..M {
+                    sums[j][i] = simd.mul_add_e_f64s(left[i], factor, sums[j][i]);
+                }
+            }
+        }
+        for (j, sums) in sums.iter().enumerate() {
+            let target = &mut c[(column + j) * n..(column + j + 1) * n];
+            store::<S, M>(sums, &mut target[self.first * S::F64_LANES..]);
+        }
+    }
+}
+
+/// Writes vectors to a slice that may end before they do.
+#[inline(always)]
+fn store<S: pulp::Simd, const M: usize>(vectors: &[S::f64s; M], target: &mut [f64]) {
+    let values: &[f64] = bytemuck_cast::<S, M>(vectors);
+    let len = target.len().min(values.len());
+    target[..len].copy_from_slice(&values[..len]);
+}
+
+#[inline(always)]
+fn bytemuck_cast<S: pulp::Simd, const M: usize>(vectors: &[S::f64s; M]) -> &[f64] {
+    pulp::bytemuck::cast_slice(&vectors[..])
+}
+
+struct Inverse<'a> {
+    n: usize,
+    l: &'a [f64],
+    out: &'a mut [f64],
+    padded: &'a mut [f64],
+}
+
+impl pulp::WithSimd for Inverse<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Self { n, l, out, padded } = self;
+        let stride = n.next_multiple_of(PADDING);
+        let rows = &mut padded[..n * stride];
+        rows.fill(0.0);
+        // X = L⁻¹ row by row, from L X = I.
+        for k in 0..n {
+            let (done, row) = rows.split_at_mut(k * stride);
+            let pivot = 1.0 / l[k + k * n];
+            let (row, _) = S::as_mut_simd_f64s(&mut row[..stride]);
+            let (done, _) = S::as_simd_f64s(done);
+            let height = row.len();
+            for (j, above) in done.chunks_exact(height).enumerate() {
+                let factor = simd.splat_f64s(-l[k + j * n]);
+                // Row j of a lower triangle ends at its diagonal.
+                for (x, above) in row.iter_mut().zip(above).take(j / S::F64_LANES + 1) {
+                    *x = simd.mul_add_e_f64s(factor, *above, *x);
+                }
+            }
+            let scale = simd.splat_f64s(pivot);
+            row.iter_mut().for_each(|x| *x = simd.mul_f64s(*x, scale));
+            let row: &mut [f64] = pulp::bytemuck::cast_slice_mut(row);
+            row[k] = pivot;
+        }
+        // XᵀX, the rows of its upper triangle as columns of the lower one: column i = Σ_{k ≥ i} X[k, i] X[k, ..], rows from i on.
+        let height = stride / S::F64_LANES;
+        let (vectors, _) = S::as_simd_f64s(&*rows);
+        let mut sums = [simd.splat_f64s(0.0); MOST];
+        let mut column = 0;
+        while column < n {
+            let width = 4.min(n - column);
+            let first = column / S::F64_LANES;
+            let used = height - first;
+            sums[..4 * used].fill(simd.splat_f64s(0.0));
+            for (k, x) in vectors.chunks_exact(height).enumerate().skip(column) {
+                for j in 0..width {
+                    let factor = simd.splat_f64s(rows[k * stride + column + j]);
+                    // Column j ends at row k.
+                    let reach = (k / S::F64_LANES + 1 - first).min(used);
+                    for (sum, x) in sums[j * used..j * used + reach].iter_mut().zip(&x[first..]) {
+                        *sum = simd.mul_add_e_f64s(factor, *x, *sum);
+                    }
+                }
+            }
+            for j in 0..width {
+                let values: &[f64] = pulp::bytemuck::cast_slice(&sums[j * used..(j + 1) * used]);
+                let start = first * S::F64_LANES;
+                out[(column + j) * n + start..(column + j + 1) * n].copy_from_slice(&values[..n - start]);
+            }
+            column += width;
+        }
+        mirror_lower(n, out);
+    }
+}
