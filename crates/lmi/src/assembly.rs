@@ -22,13 +22,14 @@ struct Line {
     start: usize,
 }
 
-/// A stack of a block: columns `u..` and `v..` of W, and for each row where its line's sum begins.
+/// A stack of a block: columns `u..` and `v..` of W, and for each row where its line's sum begins and its last unknown, falling.
 #[derive(Debug)]
 struct Target {
     u: usize,
     v: usize,
     width: usize,
     starts: Vec<usize>,
+    lasts: Vec<usize>,
 }
 
 /// One block.
@@ -94,7 +95,7 @@ impl Assembly {
             let (mut targets, mut own) = (Vec::new(), Vec::new());
             for group in factored.groups() {
                 let width = group.cols.next_multiple_of(PADDING);
-                let mut starts = Vec::with_capacity(group.rows);
+                let (mut starts, mut lasts) = (Vec::with_capacity(group.rows), Vec::with_capacity(group.rows));
                 for positions in group.positions.chunks_exact(group.cols) {
                     let lines = &mut assembly.lines;
                     let line = *known.entry(positions).or_insert_with(|| {
@@ -104,9 +105,10 @@ impl Assembly {
                         lines.len() - 1
                     });
                     starts.push(assembly.lines[line].start);
+                    lasts.push(assembly.lines[line].last);
                     own.push(line);
                 }
-                targets.push(Target { u: group.u, v: group.v, width, starts });
+                targets.push(Target { u: group.u, v: group.v, width, starts, lasts });
             }
             for row in factored.rows() {
                 let g = &factored.groups()[row.group];
@@ -204,11 +206,12 @@ impl pulp::WithSimd for Rows<'_> {
                 };
                 let first = terms(source.places[0]);
                 if source.count == 1 {
-                    targets.iter().for_each(|target| outer_products(simd, target, first, sums));
+                    targets.iter().for_each(|target| outer_products(simd, target, row.unknown, first, sums));
                 } else {
                     let [a, b, c, d] = first;
                     let [e, f, g, h] = terms(source.places[1]);
-                    targets.iter().for_each(|target| outer_products(simd, target, [a, b, c, d, e, f, g, h], sums));
+                    let all = [a, b, c, d, e, f, g, h];
+                    targets.iter().for_each(|target| outer_products(simd, target, row.unknown, all, sums));
                 }
             }
             let target = &mut self.m[row.unknown * self.unknowns..(row.unknown + 1) * self.unknowns];
@@ -220,20 +223,21 @@ impl pulp::WithSimd for Rows<'_> {
     }
 }
 
-/// sums ← sums + Σ_k left_k[u + r] · right_k[v..] for every row r.
+/// sums ← sums + Σ_k left_k[u + r] · right_k[v..] for every row r with unknowns from `unknown` on.
 #[inline(always)]
 fn outer_products<S: pulp::Simd, const K: usize>(
     simd: S,
     target: &Target,
+    unknown: usize,
     terms: [(&[f64], &[f64]); K],
     sums: &mut [f64],
 ) {
-    let rows = target.starts.len();
+    let rows = target.lasts.iter().take_while(|&&last| last >= unknown).count();
     let lefts = terms.map(|(left, _)| &left[target.u..target.u + rows]);
     let rights = terms.map(|(_, right)| S::as_simd_f64s(&right[target.v..target.v + target.width]).0);
     for c in 0..target.width / S::F64_LANES {
         let right: [S::f64s; K] = std::array::from_fn(|k| rights[k][c]);
-        for (r, &start) in target.starts.iter().enumerate() {
+        for (r, &start) in target.starts[..rows].iter().enumerate() {
             let (sum, _) = S::as_mut_simd_f64s(&mut sums[start + c * S::F64_LANES..start + (c + 1) * S::F64_LANES]);
             let mut total = sum[0];
             for k in 0..K {

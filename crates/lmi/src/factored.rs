@@ -26,6 +26,20 @@ pub(crate) struct Stack {
     pub positions: Vec<usize>,
 }
 
+impl Stack {
+    /// Rows in the order of their last unknowns, falling: those that a row of the lower triangle of M does not reach come last.
+    fn by_last_unknown(self) -> Self {
+        let cols = self.v.len();
+        let row = |r: usize| &self.positions[r * cols..(r + 1) * cols];
+        let last = |r: usize| row(r).iter().copied().filter(|&at| at != NO_UNKNOWN).max();
+        let mut order: Vec<usize> = (0..self.u.len()).collect();
+        order.sort_by_key(|&r| std::cmp::Reverse(last(r)));
+        let u = order.iter().map(|&r| self.u[r].clone()).collect();
+        let positions = order.iter().flat_map(|&r| row(r).iter().copied()).collect();
+        Self { u, v: self.v, positions }
+    }
+}
+
 /// Sparse columns.
 #[derive(Debug, Default)]
 struct Columns {
@@ -94,7 +108,7 @@ impl Factored {
         let mut w = Columns::default();
         let mut groups = Vec::new();
         let mut rows: Vec<Row> = Vec::new();
-        for stack in stacks {
+        for stack in stacks.into_iter().map(Stack::by_last_unknown) {
             let (u, count) = (w.len(), stack.u.len());
             stack.u.iter().for_each(|column| w.push(column));
             let (v, cols) = (w.len(), stack.v.len());

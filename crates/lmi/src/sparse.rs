@@ -111,7 +111,8 @@ impl Sparse {
             // Operations, those of the dense product counted by vectors of about six.
             let (whole, entrywise) = (n * n * (k + 6) / 6 + remaining, 2 * k * remaining);
             c.whole = whole < entrywise;
-            cost += c.full.len() * n / 6 + whole.min(entrywise);
+            // Single entries cost about twice what they count.
+            cost += c.full.len() * n / 6 + if c.whole { whole } else { 2 * entrywise };
             remaining -= c.entries.len();
             c.start = weights.len();
             let weight =
