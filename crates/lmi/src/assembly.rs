@@ -22,14 +22,15 @@ struct Line {
     start: usize,
 }
 
-/// A stack of a block: columns `u..` and `v..` of W, and for each row where its line's sum begins and its last unknown, falling.
+/// A stack of a block: columns `u..` and `v..` of W, and for each row where its line's sum begins.
 #[derive(Debug)]
 struct Target {
     u: usize,
     v: usize,
     width: usize,
     starts: Vec<usize>,
-    lasts: Vec<usize>,
+    /// The last unknown among each [`PADDING`] columns of each row.
+    lasts: Vec<Vec<usize>>,
 }
 
 /// One block.
@@ -95,7 +96,8 @@ impl Assembly {
             let (mut targets, mut own) = (Vec::new(), Vec::new());
             for group in factored.groups() {
                 let width = group.cols.next_multiple_of(PADDING);
-                let (mut starts, mut lasts) = (Vec::with_capacity(group.rows), Vec::with_capacity(group.rows));
+                let mut starts = Vec::with_capacity(group.rows);
+                let mut lasts = vec![Vec::with_capacity(group.rows); width / PADDING];
                 for positions in group.positions.chunks_exact(group.cols) {
                     let lines = &mut assembly.lines;
                     let line = *known.entry(positions).or_insert_with(|| {
@@ -105,7 +107,9 @@ impl Assembly {
                         lines.len() - 1
                     });
                     starts.push(assembly.lines[line].start);
-                    lasts.push(assembly.lines[line].last);
+                    for (lasts, positions) in lasts.iter_mut().zip(positions.chunks(PADDING)) {
+                        lasts.push(last(positions));
+                    }
                     own.push(line);
                 }
                 targets.push(Target { u: group.u, v: group.v, width, starts, lasts });
@@ -155,8 +159,7 @@ impl Line {
     fn new(positions: &[usize], start: usize) -> Self {
         let first = positions[0];
         let runs = first != NO_UNKNOWN && positions.iter().enumerate().all(|(s, &at)| at == first + s);
-        let last = positions.iter().copied().filter(|&at| at != NO_UNKNOWN).max().unwrap_or(0);
-        Self { positions: positions.to_vec(), run: runs.then_some(first), last, start }
+        Self { positions: positions.to_vec(), run: runs.then_some(first), last: last(positions), start }
     }
 
     /// Adds the entries of the sum from `unknown` on to a row of the Schur complement.
@@ -174,6 +177,11 @@ impl Line {
             }
         }
     }
+}
+
+/// The last unknown.
+fn last(positions: &[usize]) -> usize {
+    positions.iter().copied().filter(|&at| at != NO_UNKNOWN).max().unwrap_or(0)
 }
 
 /// All rows.
@@ -223,7 +231,8 @@ impl pulp::WithSimd for Rows<'_> {
     }
 }
 
-/// sums ← sums + Σ_k left_k[u + r] · right_k[v..] for every row r with unknowns from `unknown` on.
+/// sums ← sums + Σ_k left_k[u + r] · right_k[v..] for every row r with unknowns from `unknown` on. Rows come with falling last
+/// unknowns; where their columns do not, a little too much is computed.
 #[inline(always)]
 fn outer_products<S: pulp::Simd, const K: usize>(
     simd: S,
@@ -232,10 +241,12 @@ fn outer_products<S: pulp::Simd, const K: usize>(
     terms: [(&[f64], &[f64]); K],
     sums: &mut [f64],
 ) {
-    let rows = target.lasts.iter().take_while(|&&last| last >= unknown).count();
+    let rows = target.starts.len();
     let lefts = terms.map(|(left, _)| &left[target.u..target.u + rows]);
     let rights = terms.map(|(_, right)| S::as_simd_f64s(&right[target.v..target.v + target.width]).0);
     for c in 0..target.width / S::F64_LANES {
+        let lasts = &target.lasts[c * S::F64_LANES / PADDING];
+        let rows = rows - lasts.iter().rev().take_while(|&&last| last < unknown).count();
         let right: [S::f64s; K] = std::array::from_fn(|k| rights[k][c]);
         for (r, &start) in target.starts[..rows].iter().enumerate() {
             let (sum, _) = S::as_mut_simd_f64s(&mut sums[start + c * S::F64_LANES..start + (c + 1) * S::F64_LANES]);

@@ -1,8 +1,6 @@
 //! Kernels on matrices of up to [`MOST`] rows, whose columns fit a few vector registers. Column by column in slices; inner loops run
 //! over columns that are padded to whole vectors.
 
-use crate::dense::mirror_lower;
-
 /// Most rows.
 pub(crate) const MOST: usize = 40;
 /// Columns are padded to a multiple of this, at least the widest vector register.
@@ -10,7 +8,7 @@ const PADDING: usize = 8;
 
 /// Scratch memory, n padded columns.
 pub(crate) fn scratch() -> Vec<f64> {
-    vec![0.0; MOST * MOST.next_multiple_of(PADDING)]
+    vec![0.0; MOST * MOST * PADDING]
 }
 
 /// c = a · b.
@@ -120,14 +118,9 @@ impl<V: Copy> Panel<'_, V> {
 /// Writes vectors to a slice that may end before they do.
 #[inline(always)]
 fn store<S: pulp::Simd, const M: usize>(vectors: &[S::f64s; M], target: &mut [f64]) {
-    let values: &[f64] = bytemuck_cast::<S, M>(vectors);
+    let values: &[f64] = pulp::bytemuck::cast_slice(&vectors[..]);
     let len = target.len().min(values.len());
     target[..len].copy_from_slice(&values[..len]);
-}
-
-#[inline(always)]
-fn bytemuck_cast<S: pulp::Simd, const M: usize>(vectors: &[S::f64s; M]) -> &[f64] {
-    pulp::bytemuck::cast_slice(&vectors[..])
 }
 
 struct Inverse<'a> {
@@ -142,56 +135,61 @@ impl pulp::WithSimd for Inverse<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
+        // The number of vectors in a column is known to the compiler, so that they stay in registers.
+        macro_rules! by_height {
+            ($height:expr, $($known:literal)*) => {
+                match $height {
+                    $($known => self.with_height::<S, $known>(simd),)*
+                    _ => self.with_height::<S, MOST>(simd),
+                }
+            };
+        }
+        by_height!(self.n.next_multiple_of(PADDING) / S::F64_LANES, 1 2 3 4 5 6 8 10);
+    }
+}
+
+impl Inverse<'_> {
+    /// For columns of at most H vectors.
+    #[inline(always)]
+    fn with_height<S: pulp::Simd, const H: usize>(self, simd: S) {
         let Self { n, l, out, padded } = self;
-        let stride = n.next_multiple_of(PADDING);
-        let rows = &mut padded[..n * stride];
-        rows.fill(0.0);
+        let stride = H * S::F64_LANES;
+        let (rows, _) = S::as_mut_simd_f64s(&mut padded[..n * stride]);
         // X = L⁻¹ row by row, from L X = I.
         for k in 0..n {
-            let (done, row) = rows.split_at_mut(k * stride);
-            let pivot = 1.0 / l[k + k * n];
-            let (row, _) = S::as_mut_simd_f64s(&mut row[..stride]);
-            let (done, _) = S::as_simd_f64s(done);
-            let height = row.len();
-            for (j, above) in done.chunks_exact(height).enumerate() {
+            let (done, row) = rows.split_at_mut(k * H);
+            let mut sums = [simd.splat_f64s(0.0); H];
+            for (j, above) in done.chunks_exact(H).enumerate() {
                 let factor = simd.splat_f64s(-l[k + j * n]);
-                // Row j of a lower triangle ends at its diagonal.
-                for (x, above) in row.iter_mut().zip(above).take(j / S::F64_LANES + 1) {
-                    *x = simd.mul_add_e_f64s(factor, *above, *x);
+                for i in 0..H {
+                    sums[i] = simd.mul_add_e_f64s(factor, above[i], sums[i]);
                 }
             }
+            let pivot = 1.0 / l[k + k * n];
             let scale = simd.splat_f64s(pivot);
-            row.iter_mut().for_each(|x| *x = simd.mul_f64s(*x, scale));
-            let row: &mut [f64] = pulp::bytemuck::cast_slice_mut(row);
+            for i in 0..H {
+                row[i] = simd.mul_f64s(sums[i], scale);
+            }
+            let row: &mut [f64] = pulp::bytemuck::cast_slice_mut(&mut row[..H]);
             row[k] = pivot;
         }
-        // XᵀX, the rows of its upper triangle as columns of the lower one: column i = Σ_{k ≥ i} X[k, i] X[k, ..], rows from i on.
-        let height = stride / S::F64_LANES;
-        let (vectors, _) = S::as_simd_f64s(&*rows);
-        let mut sums = [simd.splat_f64s(0.0); MOST];
+        // XᵀX, two columns at a time: column i = Σ_{k ≥ i} X[k, i] X[k, ..].
         let mut column = 0;
         while column < n {
-            let width = 4.min(n - column);
-            let first = column / S::F64_LANES;
-            let used = height - first;
-            sums[..4 * used].fill(simd.splat_f64s(0.0));
-            for (k, x) in vectors.chunks_exact(height).enumerate().skip(column) {
-                for j in 0..width {
-                    let factor = simd.splat_f64s(rows[k * stride + column + j]);
-                    // Column j ends at row k.
-                    let reach = (k / S::F64_LANES + 1 - first).min(used);
-                    for (sum, x) in sums[j * used..j * used + reach].iter_mut().zip(&x[first..]) {
-                        *sum = simd.mul_add_e_f64s(factor, *x, *sum);
-                    }
+            let second = (column + 1).min(n - 1);
+            let mut sums = [[simd.splat_f64s(0.0); H]; 2];
+            for x in rows.chunks_exact(H).skip(column) {
+                let entries: &[f64] = pulp::bytemuck::cast_slice(x);
+                let factors = [simd.splat_f64s(entries[column]), simd.splat_f64s(entries[second])];
+                for i in 0..H {
+                    sums[0][i] = simd.mul_add_e_f64s(factors[0], x[i], sums[0][i]);
+                    sums[1][i] = simd.mul_add_e_f64s(factors[1], x[i], sums[1][i]);
                 }
             }
-            for j in 0..width {
-                let values: &[f64] = pulp::bytemuck::cast_slice(&sums[j * used..(j + 1) * used]);
-                let start = first * S::F64_LANES;
-                out[(column + j) * n + start..(column + j + 1) * n].copy_from_slice(&values[..n - start]);
+            for (at, sums) in [column, second].into_iter().zip(&sums) {
+                store::<S, H>(sums, &mut out[at * n..(at + 1) * n]);
             }
-            column += width;
+            column += 2;
         }
-        mirror_lower(n, out);
     }
 }
