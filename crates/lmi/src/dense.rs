@@ -21,8 +21,7 @@ impl Scratch {
     pub fn new(n: usize) -> Self {
         let factor = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
         let inverse = llt::inverse::inverse_scratch::<f64>(n, Par::Seq);
-        let solve = llt::solve::solve_in_place_scratch::<f64>(n, 1, Par::Seq);
-        Self { buffer: MemBuffer::new(factor.or(inverse).or(solve)), padded: small::scratch() }
+        Self { buffer: MemBuffer::new(factor.or(inverse)), padded: small::scratch() }
     }
 }
 
@@ -107,6 +106,22 @@ pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], scratch:
         return;
     }
     small::inverse_from_factor(n, l, out, &mut scratch.padded);
+}
+
+vectorized! {
+    /// x ← (L Lᵀ)⁻¹ x for the lower triangle L.
+    pub(crate) fn solve_with_factor<'a>(n: usize, l: &'a [f64], x: &'a mut [f64]) {
+        for j in 0..n {
+            let column = &l[j * n + j..(j + 1) * n];
+            let value = x[j] / column[0];
+            x[j] = value;
+            axpy(-value, &column[1..], &mut x[j + 1..n]);
+        }
+        for j in (0..n).rev() {
+            let column = &l[j * n + j..(j + 1) * n];
+            x[j] = (x[j] - dot(&column[1..], &x[j + 1..n])) / column[0];
+        }
+    }
 }
 
 /// Copies the lower triangle to the upper one.

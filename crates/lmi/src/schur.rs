@@ -1,10 +1,8 @@
 //! The Schur complement system `M dx = r`, `M_ij = Σ_b tr(F_{b,i} S_b⁻¹ F_{b,j} Z_b)`: symmetric, positive semidefinite,
 //! definite when the coefficient matrices are linearly independent.
 
-use crate::dense::{Scratch, axpy, cholesky, dot, norm};
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt;
-use faer::{Conj, MatMut, MatRef, Par};
+use crate::dense::{Scratch, axpy, cholesky, dot, norm, solve_with_factor};
+use crate::vectorized::vectorized;
 
 /// Rounds of refinement at most.
 const ROUNDS: usize = 4;
@@ -18,7 +16,6 @@ pub(crate) struct Schur {
     /// 1/√M_ii: the factorised matrix is scaled to a unit diagonal.
     scale: Vec<f64>,
     scratch: Scratch,
-    buffer: MemBuffer,
     residual: Vec<f64>,
     correction: Vec<f64>,
     /// What was added to the unit diagonal to make the factorisation exist.
@@ -33,7 +30,6 @@ impl Schur {
             factor: vec![0.0; n * n],
             scale: vec![0.0; n],
             scratch: Scratch::new(n),
-            buffer: MemBuffer::new(llt::solve::solve_in_place_scratch::<f64>(n, 1, Par::Seq)),
             residual: vec![0.0; n],
             correction: vec![0.0; n],
             regularization: 0.0,
@@ -115,24 +111,23 @@ impl Schur {
     fn solve_factored(&mut self) {
         let n = self.n;
         self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
-        llt::solve::solve_in_place_with_conj(
-            MatRef::from_column_major_slice(&self.factor, n, n),
-            Conj::No,
-            MatMut::from_column_major_slice_mut(&mut self.correction, n, 1),
-            Par::Seq,
-            MemStack::new(&mut self.buffer),
-        );
+        solve_with_factor(n, &self.factor, &mut self.correction);
         self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
     }
 
     /// residual = r − M x from the lower triangle.
     fn update_residual(&mut self, r: &[f64], x: &[f64]) {
-        let n = self.n;
-        self.residual.copy_from_slice(r);
-        for j in 0..n {
-            let column = &self.matrix[j * n..(j + 1) * n];
-            axpy(-x[j], &column[j..], &mut self.residual[j..]);
-            self.residual[j] -= dot(&column[j + 1..], &x[j + 1..]);
+        subtract_product(self.n, &self.matrix, r, x, &mut self.residual);
+    }
+}
+
+vectorized! {
+    /// out = r − M x for the lower triangle of a symmetric M.
+    fn subtract_product<'a>(n: usize, m: &'a [f64], r: &'a [f64], x: &'a [f64], out: &'a mut [f64]) {
+        out.copy_from_slice(r);
+        for (j, column) in m.chunks_exact(n).enumerate() {
+            axpy(-x[j], &column[j..], &mut out[j..]);
+            out[j] -= dot(&column[j + 1..], &x[j + 1..]);
         }
     }
 }
