@@ -7,8 +7,8 @@ use serde::Serialize;
 /// How a solve ended.
 #[derive(Clone, Debug, Serialize)]
 pub enum Outcome {
-    /// Optimal: the relative duality gap is at most 1e-7 (by default it aims for 1e-9), the residuals are within
-    /// tolerance, and of every block, recomputed from the data as stated, a lower bound on the smallest eigenvalue is
+    /// Optimal: the relative duality gap is at most 1e-7 (by default it aims for 1e-8), what the dual residual leaves uncertain of it at
+    /// most 1e-6, the residuals are within tolerance, and of every block, recomputed from the data as stated, a lower bound on the smallest eigenvalue is
     /// **proved** ([`BlockReport::verified_lower_bound`]) that is positive for strict inequalities, at least the margin (up to rounding) where one
     /// was given, and for [`Sdp`](crate::sdpa::Sdp) at least −tolerance·(1 + ‖F₀‖).
     Solved,
@@ -92,9 +92,10 @@ pub struct Residuals {
     pub primal: f64,
     /// ‖c − A(Z)‖ / (1 + ‖c‖) in the largest absolute entry, `A(Z)ᵢ = Σ_b⟨F_{b,i}, Z_b⟩`.
     pub dual: f64,
-    /// max(|p − d|, Σ|cᵢ − A(Z)ᵢ||xᵢ|) / (1 + |p| + |d|) for the objective p and the dual objective d: the second term is what the dual
-    /// residual may take from the bound d.
+    /// |p − d| / (1 + |p| + |d|) for the objective p and the dual objective d.
     pub gap: f64,
+    /// Σ|cᵢ − A(Z)ᵢ||xᵢ| / (1 + |p| + |d|): what the dual residual may take from the bound d, for an optimum of about this x.
+    pub uncertainty: f64,
 }
 
 /// What balancing did to the problem before it was solved; it is undone in the answer.

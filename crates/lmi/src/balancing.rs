@@ -87,7 +87,7 @@ pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) ->
 
 /// Whether the iteration gave up far from an answer.
 fn far_off(solution: &Solution, options: &Options) -> bool {
-    let Residuals { primal, dual, gap } = solution.residuals;
+    let Residuals { primal, dual, gap, .. } = solution.residuals;
     let near = primal.max(dual) <= 10.0 * options.feasibility_tolerance && gap <= FAR_OFF;
     matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled)) && !near
 }

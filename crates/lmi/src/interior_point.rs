@@ -19,8 +19,9 @@ use std::time::Instant;
 
 /// A point whose relative gap is still larger than this is well inside.
 const BACK_OFF: f64 = 1e-6;
-/// Largest relative gap of a point that is called solved.
-const SOLVED_GAP: f64 = 1e-7;
+/// Largest relative gap of a point that is called solved, and what the dual residual may take from it.
+pub(crate) const SOLVED_GAP: f64 = 1e-7;
+pub(crate) const SOLVED_UNCERTAINTY: f64 = 1e-6;
 /// A multiplier is a witness of infeasibility when its residual is this small against the dual objective: rounding level.
 const CERTIFICATE: f64 = 1e-14;
 
@@ -110,9 +111,9 @@ struct Status {
 impl Status {
     /// At most 1 for a point that may be called solved.
     fn merit(&self, options: &Options) -> f64 {
-        let Residuals { primal, dual, gap } = self.residuals;
+        let Residuals { primal, dual, gap, uncertainty } = self.residuals;
         let feasibility = nan_max(primal, dual) / options.feasibility_tolerance;
-        let merit = nan_max(feasibility, gap / SOLVED_GAP);
+        let merit = nan_max(feasibility, nan_max(gap / SOLVED_GAP, uncertainty / SOLVED_UNCERTAINTY));
         if merit.is_nan() { f64::INFINITY } else { merit }
     }
 }
@@ -164,12 +165,13 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
             primal_step: 0.0,
             dual_step: 0.0,
         });
-        let Residuals { primal, dual, gap } = status.residuals;
+        let Residuals { primal, dual, gap, uncertainty } = status.residuals;
         if it.feasible && gap > BACK_OFF {
             interior = Some(it.x.clone());
         }
         let tolerance = options.feasibility_tolerance;
-        if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance {
+        let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
+        if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance && certain {
             break Ending::Converged;
         }
         let witness = it.witness_residual(&status);
@@ -293,7 +295,8 @@ impl<'a> Iteration<'a> {
         let residuals = Residuals {
             primal: self.primal_residual(),
             dual: self.dual_residual(),
-            gap: nan_max((objective - dual_objective).abs(), uncertainty) / scale,
+            gap: (objective - dual_objective).abs() / scale,
+            uncertainty: uncertainty / scale,
         };
         Status { objective, dual_objective, residuals, mu: complementarity / self.order }
     }

@@ -2,7 +2,7 @@
 
 use crate::answer::{Answer, Balancing, BlockReport, InaccurateReason, Outcome, Ray, Witness};
 use crate::expression::Unknown;
-use crate::interior_point::{Ending, Solution};
+use crate::interior_point::{Ending, SOLVED_GAP, Solution};
 use crate::lowering::Layout;
 use crate::rigorous::Enclosure;
 use crate::verification::{Spectrum, largest_entry, square};
@@ -65,7 +65,7 @@ pub(crate) fn report(
     let gap = (objective - dual_objective).abs();
     if let Ending::Converged = result.ending {
         residuals.gap = residuals.gap.max(gap / (1.0 + objective.abs() + dual_objective.abs()));
-        verified &= gap.is_finite() && objective.is_finite() && residuals.gap <= 1e-7;
+        verified &= gap.is_finite() && objective.is_finite() && residuals.gap <= SOLVED_GAP;
     }
     let unverified = Outcome::Inaccurate(InaccurateReason::NotVerified);
     let outcome = match result.ending {
