@@ -61,6 +61,9 @@ pub enum InaccurateReason {
     TimeLimit,
     /// The caller cancelled.
     Cancelled,
+    /// The objective comes ever closer to its bound, but only as the unknowns grow without end: no point attains the optimum. The
+    /// objectives are those of the last point.
+    NotAttained,
     /// Rounding errors stopped progress: the problem has no interior, or is badly conditioned.
     Stalled,
     /// The solver converged, but what it found cannot be proved on the data as stated: a block is not positive definite by its margin, or

@@ -22,6 +22,9 @@ const BACK_OFF: f64 = 1e-6;
 /// Largest relative gap of a point that is called solved, and what the dual residual may take from it.
 pub(crate) const SOLVED_GAP: f64 = 1e-7;
 pub(crate) const SOLVED_UNCERTAINTY: f64 = 1e-6;
+/// Relative gap from which on x should no longer change by orders of magnitude, and growth that shows that no x attains the optimum.
+const SETTLED: f64 = 1e-2;
+const RUNAWAY: f64 = 1e5;
 /// A multiplier is a witness of infeasibility when its residual is this small against the dual objective: rounding level.
 const CERTIFICATE: f64 = 1e-14;
 
@@ -147,6 +150,8 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let mut since_progress = 0;
     let mut best_witness = f64::INFINITY;
     let mut interior = None;
+    // ‖x‖ when the gap was first small.
+    let mut settled = None;
     let ending = loop {
         it.update_residuals();
         let status = it.status();
@@ -168,6 +173,9 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         let Residuals { primal, dual, gap, uncertainty } = status.residuals;
         if it.feasible && gap > BACK_OFF {
             interior = Some(it.x.clone());
+        }
+        if it.feasible && gap <= SETTLED {
+            settled = settled.or(Some(norm(&it.x)));
         }
         let tolerance = options.feasibility_tolerance;
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
@@ -208,6 +216,11 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
             Some(ray) => Ending::DualInfeasible(ray),
             None => ending,
         },
+        other => other,
+    };
+    let grown = |before: f64| best.as_ref().is_some_and(|(.., point)| norm(&point.x) > RUNAWAY * before.max(1.0));
+    let ending = match ending {
+        Ending::Converged if settled.is_some_and(grown) => Ending::Stopped(InaccurateReason::NotAttained),
         other => other,
     };
     let (_, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));

@@ -404,6 +404,7 @@ fn column(m: &Mat<f64>, j: usize, factor: f64) -> Vec<f64> {
 mod tests {
     use super::*;
     use crate::Problem;
+    use crate::assembly::Assembly;
 
     fn patternless(rows: usize, cols: usize) -> Mat<f64> {
         Mat::from_fn(rows, cols, |i, j| ((3 * i + 5 * j + i * j) % 11) as f64 / 7.0 - 0.6)
@@ -482,7 +483,10 @@ mod tests {
         let mut adjoint = vec![0.0; n];
         block.adjoint(1.0, &p, &mut adjoint, &mut scratch);
         let mut m = vec![0.0; n * n];
-        block.schur(&p, &z, &mut m, n, &mut scratch);
+        let blocks = [block];
+        let mut assembly = Assembly::new(&blocks);
+        blocks[0].schur(0, [&p, &z], &mut assembly, &mut m, n, &mut scratch);
+        assembly.add(&mut m, n);
         let matrix = |v: &[f64]| Mat::from_fn(8, 8, |i, j| v[i + 8 * j]);
         for j in 0..n {
             let inner: f64 = coefficients[j].iter().zip(&p).map(|(a, b)| a * b).sum();

@@ -125,7 +125,7 @@ vectorized! {
     /// out = r − M x for the lower triangle of a symmetric M.
     fn subtract_product<'a>(n: usize, m: &'a [f64], r: &'a [f64], x: &'a [f64], out: &'a mut [f64]) {
         out.copy_from_slice(r);
-        for (j, column) in m.chunks_exact(n).enumerate() {
+        for (j, column) in m.chunks_exact(n.max(1)).enumerate() {
             axpy(-x[j], &column[j..], &mut out[j..]);
             out[j] -= dot(&column[j + 1..], &x[j + 1..]);
         }
