@@ -7,21 +7,31 @@
 //! [ S                         0     R⁻¹ ]
 //! ```
 //!
-//! `cargo run --release -p lmi --example saturated_regulator [REPETITIONS]`
+//! With `--low-gain` S = L = M, one vertex; with `--sweep` a grid of yaw angles, each solved near the one before.
+//!
+//! `cargo run --release -p lmi --example saturated_regulator -- [--low-gain] [REPETITIONS | --sweep POINTS]`
 
 use lmi::{Expr, Mat, Options, Problem};
 use std::time::Instant;
 
-/// Design at one yaw angle: (problem, Y).
-fn high_gain(a: &Mat<f64>, b: &Mat<f64>, q: &[f64], r: &[f64], sigma: f64, gamma: f64) -> (Problem, Expr) {
+/// The problem and Y; with low gain S = L = M.
+fn saturated(
+    a: &Mat<f64>,
+    b: &Mat<f64>,
+    q: &[f64],
+    r: &[f64],
+    sigma: f64,
+    gamma: f64,
+    low_gain: bool,
+) -> (Problem, Expr) {
     let (n, m) = (a.nrows(), b.ncols());
     let mut p = Problem::new();
     let y = p.symmetric("Y", n);
-    let l = p.rectangular("L", m, n);
     let k = p.rectangular("M", m, n);
-    for vertex in 0..1_u32 << m {
+    let l = if low_gain { k.clone() } else { p.rectangular("L", m, n) };
+    for vertex in if low_gain { 0..1 } else { 0..1_u32 << m } {
         let v = Mat::from_fn(m, m, |i, j| f64::from(u32::from(i == j) & (vertex >> i)));
-        let s = &v * &l + (Mat::<f64>::identity(m, m) - &v) * &k;
+        let s = if low_gain { k.clone() } else { &v * &l + (Mat::<f64>::identity(m, m) - &v) * &k };
         let f = a * &y - b * &s;
         p.positive_definite(
             format!("Riccati, vertex {vertex}"),
@@ -75,14 +85,24 @@ fn quadrotor(yaw_rad: f64) -> (Mat<f64>, Mat<f64>) {
     (a, b)
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let repetitions: usize = std::env::args().nth(1).map_or(Ok(1), |text| text.parse())?;
-    let (a, b) = quadrotor(0.3);
+/// Weights, σ = mg/4 and γ = 20 at one yaw angle.
+fn design(yaw_rad: f64, low_gain: bool) -> (Problem, Expr) {
+    let (a, b) = quadrotor(yaw_rad);
     let q = [1.0, 1.0, 100.0, 1.0, 1.0, 50.0, 50.0, 50.0, 50.0, 1.0, 1.0, 100.0];
+    saturated(&a, &b, &q, &[0.001; 4], 2.0 * 9.807 / 4.0, 20.0, low_gain)
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let (flags, numbers): (Vec<String>, Vec<String>) = std::env::args().skip(1).partition(|a| a.starts_with("--"));
+    let number = numbers.first().map_or(Ok(1), |text| text.parse())?.max(1);
+    let low_gain = flags.iter().any(|flag| flag == "--low-gain");
+    if flags.iter().any(|flag| flag == "--sweep") {
+        return sweep(number, low_gain);
+    }
     let mut fastest = f64::INFINITY;
-    for repetition in 0..repetitions.max(1) {
+    for repetition in 0..number {
         let started = Instant::now();
-        let (problem, y) = high_gain(&a, &b, &q, &[0.001; 4], 2.0 * 9.807 / 4.0, 20.0);
+        let (problem, y) = design(0.3, low_gain);
         let answer = problem.solve(&Options::default())?;
         fastest = fastest.min(started.elapsed().as_secs_f64());
         if repetition == 0 {
@@ -97,5 +117,28 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     println!("{:.1} ms", 1e3 * fastest);
+    Ok(())
+}
+
+/// A grid of yaw angles over the circle, each solved near the one before.
+fn sweep(points: usize, low_gain: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let started = Instant::now();
+    let (mut iterations, mut worst) = (0, 0.0_f64);
+    let mut before: Option<lmi::Answer> = None;
+    for k in 0..points {
+        let (problem, _) = design(std::f64::consts::TAU * k as f64 / points as f64, low_gain);
+        let answer = match &before {
+            Some(neighbour) => problem.solve_near(neighbour, &Options::default())?,
+            None => problem.solve(&Options::default())?,
+        };
+        assert!(matches!(answer.outcome, lmi::Outcome::Solved), "{:?}", answer.outcome);
+        iterations += answer.iterations.len();
+        worst = worst.max(answer.residuals.gap);
+        before = Some(answer);
+    }
+    println!(
+        "{points} points, {iterations} iterations, largest gap {worst:.1e}: {:.1} ms",
+        1e3 * started.elapsed().as_secs_f64()
+    );
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use crate::Mat;
 use crate::expression::{Expr, Unknown};
+use crate::interior_point::Centre;
 use serde::Serialize;
 
 /// How a solve ended.
@@ -151,6 +152,8 @@ pub struct Answer {
     /// Multipliers `Z_b ⪰ 0` of the inequalities, in the order stated.
     #[serde(serialize_with = "nested_rows")]
     pub multipliers: Vec<Mat<f64>>,
+    #[serde(skip)]
+    pub(crate) centre: Option<Centre>,
     #[serde(skip)]
     pub(crate) unknowns: Vec<Unknown>,
     #[serde(rename = "unknowns", serialize_with = "nested_rows")]

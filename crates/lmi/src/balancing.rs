@@ -8,8 +8,8 @@
 
 use crate::Options;
 use crate::answer::{Balancing, InaccurateReason, Residuals};
-use crate::block::Program;
-use crate::interior_point::{self, Ending, Solution};
+use crate::block::{Block, Program};
+use crate::interior_point::{self, Centre, Ending, Solution};
 
 /// Rounds of conjugate gradients for the logarithms of the factors, which need no more than one digit.
 const ROUNDS: usize = 40;
@@ -113,15 +113,12 @@ fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> 
     if let Ending::DualInfeasible(ray) = &mut solution.ending {
         unscale(ray);
     }
-    let mut first = 0;
-    for (block, z) in program.blocks.iter().zip(&mut solution.point.z) {
-        let n = block.size();
-        let d = &factors.rows[first..first + n];
-        first += n;
-        for (at, z) in z.iter_mut().enumerate() {
-            let (i, j) = if block.is_diagonal() { (at, at) } else { (at % n, at / n) };
-            *z = *z * d[i] * d[j] / omega;
-        }
+    let divided = |d: f64, value: f64| value * d / omega;
+    scale_matrices(program, factors, &mut solution.point.z, divided);
+    if let Some(centre) = &mut solution.centre {
+        unscale(&mut centre.x);
+        scale_matrices(program, factors, &mut centre.s, |d, value| value / d);
+        scale_matrices(program, factors, &mut centre.z, divided);
     }
     solution.dual_objective /= omega;
     for entry in &mut solution.log {
@@ -129,6 +126,28 @@ fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> 
         entry.dual_objective /= omega;
     }
     Some(solution)
+}
+
+/// Gives every entry of every block's matrix to `scaled` with its factor dᵢdⱼ.
+fn scale_matrices(program: &Program, factors: &Factors, matrices: &mut [Vec<f64>], scaled: impl Fn(f64, f64) -> f64) {
+    let mut first = 0;
+    for (block, matrix) in program.blocks.iter().zip(matrices) {
+        let n = block.size();
+        let d = &factors.rows[first..first + n];
+        first += n;
+        for (at, value) in matrix.iter_mut().enumerate() {
+            let (i, j) = if block.is_diagonal() { (at, at) } else { (at % n, at / n) };
+            *value = scaled(d[i] * d[j], *value);
+        }
+    }
+}
+
+/// Whether a point has the shape of these blocks.
+fn fits(blocks: &[Block], warm: &Centre) -> bool {
+    let of = |matrices: &[Vec<f64>]| {
+        matrices.len() == blocks.len() && matrices.iter().zip(blocks).all(|(m, b)| m.len() == b.constant().len())
+    };
+    of(&warm.s) && of(&warm.z)
 }
 
 /// Undoes what [`apply`] did.
@@ -143,6 +162,7 @@ fn unscale_program(program: &mut Program, factors: &Factors) {
     program.objective.iter_mut().zip(&factors.unknowns).for_each(|(c, s)| *c /= s * omega);
     program.scale.fill(1.0);
     (program.omega, program.balanced) = (1.0, false);
+    program.warm = None;
 }
 
 /// By how much rows and unknowns differ in size: the ratio of the largest to the smallest of their largest coefficients.
@@ -296,5 +316,11 @@ fn apply(program: &mut Program, factors: &Factors) -> Option<f64> {
     program.objective.iter_mut().zip(&factors.unknowns).for_each(|(c, s)| *c *= s * omega);
     program.scale.copy_from_slice(&factors.unknowns);
     (program.omega, program.balanced) = (omega, true);
+    if let Some(mut warm) = program.warm.take_if(|warm| fits(&program.blocks, warm)) {
+        warm.x.iter_mut().zip(&factors.unknowns).for_each(|(x, s)| *x /= s);
+        scale_matrices(program, factors, &mut warm.s, |d, value| value * d);
+        scale_matrices(program, factors, &mut warm.z, |d, value| value * omega / d);
+        program.warm = Some(warm);
+    }
     Some(omega)
 }

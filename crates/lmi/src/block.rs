@@ -2,6 +2,7 @@
 
 use crate::assembly::Assembly;
 use crate::factored::{Factored, FactoredScratch};
+use crate::interior_point::Centre;
 use crate::sparse::{Sparse, SparseScratch};
 
 /// A problem in the solver's form.
@@ -15,6 +16,8 @@ pub(crate) struct Program {
     /// The objective is this multiple of the one that was stated.
     pub omega: f64,
     pub balanced: bool,
+    /// A point of a neighbouring problem to begin at.
+    pub warm: Option<Centre>,
 }
 
 /// One block F_b.

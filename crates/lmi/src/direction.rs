@@ -74,6 +74,15 @@ impl BlockState {
         }
     }
 
+    /// Begins anew at S and Z; false when one of them is not positive definite.
+    pub fn begin(&mut self, s: &[f64], z: &[f64], scratch: &mut Scratch) -> bool {
+        for (to, from) in [(&mut self.s, s), (&mut self.z, z), (&mut self.s_factor, s), (&mut self.z_factor, z)] {
+            to.copy_from_slice(from);
+        }
+        factorize(self.diagonal, self.n, &mut self.s_factor, scratch)
+            && factorize(self.diagonal, self.n, &mut self.z_factor, scratch)
+    }
+
     /// R ← F(x) − S.
     pub fn update_residual(&mut self, block: &Block, x: &[f64]) {
         self.residual.copy_from_slice(block.constant());

@@ -22,6 +22,8 @@ const BACK_OFF: f64 = 1e-6;
 /// Largest relative gap of a point that is called solved, and what the dual residual may take from it.
 pub(crate) const SOLVED_GAP: f64 = 1e-7;
 pub(crate) const SOLVED_UNCERTAINTY: f64 = 1e-6;
+/// Relative gap at which a point is kept for neighbouring problems to begin at.
+const CENTRAL: f64 = 3e-2;
 /// Relative gap from which on x should no longer change by orders of magnitude, and growth that shows that no x attains the optimum.
 const SETTLED: f64 = 1e-2;
 const RUNAWAY: f64 = 1e5;
@@ -45,6 +47,14 @@ pub(crate) struct Point {
     pub z: Vec<Vec<f64>>,
 }
 
+/// A point on the way, well inside: where the iteration of a neighbouring problem may begin.
+#[derive(Clone, Debug)]
+pub(crate) struct Centre {
+    pub x: Vec<f64>,
+    pub s: Vec<Vec<f64>>,
+    pub z: Vec<Vec<f64>>,
+}
+
 /// How the iteration ended.
 #[derive(Clone, Debug)]
 pub(crate) enum Ending {
@@ -65,6 +75,8 @@ pub(crate) struct Solution {
     pub dual_objective: f64,
     /// A strictly feasible x not far from the optimum, to back off to.
     pub interior: Option<Vec<f64>>,
+    /// Where a neighbouring problem may begin.
+    pub centre: Option<Centre>,
     /// Sensible units of the unknowns.
     pub units: Vec<f64>,
     pub log: Vec<IterationLog>,
@@ -145,11 +157,15 @@ pub(crate) fn solve(program: &Program, options: &Options) -> Solution {
 
 fn iterate(program: &Program, objective: &[f64], options: &Options, started: Instant) -> Solution {
     let mut it = Iteration::new(program, objective, options);
+    if let Some(centre) = &program.warm {
+        it.begin_at(centre);
+    }
     let mut log: Vec<IterationLog> = Vec::new();
     let mut best: Option<(f64, Status, Point)> = None;
     let mut since_progress = 0;
     let mut best_witness = f64::INFINITY;
     let mut interior = None;
+    let mut centre = None;
     // ‖x‖ when the gap was first small.
     let mut settled = None;
     let ending = loop {
@@ -173,6 +189,9 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         let Residuals { primal, dual, gap, uncertainty } = status.residuals;
         if it.feasible && gap > BACK_OFF {
             interior = Some(it.x.clone());
+        }
+        if it.feasible && gap <= CENTRAL && centre.is_none() {
+            centre = Some(it.centre());
         }
         if it.feasible && gap <= SETTLED {
             settled = settled.or(Some(norm(&it.x)));
@@ -225,7 +244,8 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     };
     let (_, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));
     let units = program.scale.clone();
-    Solution { point, ending, residuals: status.residuals, dual_objective: status.dual_objective, interior, units, log }
+    let Status { residuals, dual_objective, .. } = status;
+    Solution { point, ending, residuals, dual_objective, interior, centre, units, log }
 }
 
 impl<'a> Iteration<'a> {
@@ -259,6 +279,33 @@ impl<'a> Iteration<'a> {
             objective_norm: objective.iter().fold(0.0, |m, c| m.max(c.abs())),
             blocks,
         }
+    }
+
+    /// Begins at a point of a neighbouring problem, if it is positive definite and has this problem's shape.
+    fn begin_at(&mut self, centre: &Centre) {
+        let fits = |matrices: &[Vec<f64>]| {
+            matrices.len() == self.blocks.len() && matrices.iter().zip(&self.blocks).all(|(m, b)| m.len() == b.s.len())
+        };
+        if centre.x.len() != self.x.len() || !fits(&centre.s) || !fits(&centre.z) {
+            return;
+        }
+        let before: Vec<(Vec<f64>, Vec<f64>)> = self.blocks.iter().map(|b| (b.s.clone(), b.z.clone())).collect();
+        let pairs = centre.s.iter().zip(&centre.z);
+        let scratch = &mut self.scratch;
+        if self.blocks.iter_mut().zip(pairs).all(|(state, (s, z))| state.begin(s, z, scratch)) {
+            self.x.copy_from_slice(&centre.x);
+            // Where F(x) is positive definite it takes the place of S at once.
+            self.feasible = true;
+            return;
+        }
+        for (state, (s, z)) in self.blocks.iter_mut().zip(&before) {
+            state.begin(s, z, scratch);
+        }
+    }
+
+    fn centre(&self) -> Centre {
+        let of = |part: fn(&BlockState) -> &Vec<f64>| self.blocks.iter().map(|b| part(b).clone()).collect();
+        Centre { x: self.x.clone(), s: of(|b| &b.s), z: of(|b| &b.z) }
     }
 
     fn point(&self) -> Point {

@@ -121,7 +121,7 @@ pub(crate) fn lower(
         }
         c = layout.scalars(&gradients);
     }
-    let program = Program { omega: 1.0, balanced: false, scale: vec![1.0; c.len()], objective: c, blocks };
+    let program = Program { omega: 1.0, balanced: false, scale: vec![1.0; c.len()], objective: c, blocks, warm: None };
     Ok(Lowered { program, layout, margins, objective_constant, sign })
 }
 

@@ -2,6 +2,7 @@
 
 use crate::answer::{Answer, BlockReport, InaccurateReason, Outcome};
 use crate::expression::{Expr, Unknown};
+use crate::interior_point::Centre;
 use crate::lowering::{Layout, lower};
 use crate::report::{Original, Translation, report};
 use crate::rigorous::{Enclosure, Gradient};
@@ -110,11 +111,11 @@ impl Problem {
     /// Infeasible, unbounded and inaccurate are outcomes.
     pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
         options.check()?;
-        let answer = self.solve_once(options)?;
+        let answer = self.solve_once(None, options)?;
         let unproved = matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::NotVerified));
         if unproved && options.margin > 0.0 {
             // The default margin may have been too much for a set that is thin: F(x) ≻ 0 is proved or not, whatever was imposed.
-            let again = self.solve_once(&Options { margin: 0.0, ..options.clone() })?;
+            let again = self.solve_once(None, &Options { margin: 0.0, ..options.clone() })?;
             if matches!(again.outcome, Outcome::Solved) {
                 return Ok(again);
             }
@@ -122,8 +123,29 @@ impl Problem {
         Ok(answer)
     }
 
-    fn solve_once(&self, options: &Options) -> Result<Answer, Error> {
-        let lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
+    /// Solves the problem as [`Self::solve`] does, beginning near the answer to a neighbouring problem: the same unknowns and inequalities
+    /// with other numbers, as along a grid of a parameter.
+    ///
+    /// The neighbour's course is joined where its gap was a few percent, about half way. Where that leads nowhere, or the neighbour
+    /// has another shape, the iteration begins as it always does; what is proved of the answer does not depend on where it began.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::solve`].
+    pub fn solve_near(&self, neighbour: &Answer, options: &Options) -> Result<Answer, Error> {
+        if let Some(centre) = &neighbour.centre {
+            options.check()?;
+            let answer = self.solve_once(Some(centre), options)?;
+            if matches!(answer.outcome, Outcome::Solved) {
+                return Ok(answer);
+            }
+        }
+        self.solve(options)
+    }
+
+    fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {
+        let mut lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
+        lowered.program.warm = centre.cloned();
         let (result, balancing) = balancing::solve(lowered.program, &lowered.margins, options);
         let translation = Translation {
             layout: &lowered.layout,

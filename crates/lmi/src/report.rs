@@ -93,6 +93,7 @@ pub(crate) fn report(
         residuals,
         iterations,
         multipliers,
+        centre: result.centre,
         unknowns: translation.unknowns.to_vec(),
         values,
     }

@@ -171,7 +171,14 @@ impl Sdp {
             Block::Dense(DenseBlock { size, constant, factored, sparse })
         });
         let scale = vec![1.0; self.objective.len()];
-        Program { objective: self.objective.clone(), blocks: blocks.collect(), scale, omega: 1.0, balanced: false }
+        Program {
+            objective: self.objective.clone(),
+            blocks: blocks.collect(),
+            scale,
+            omega: 1.0,
+            balanced: false,
+            warm: None,
+        }
     }
 }
 
