@@ -80,6 +80,14 @@ pub enum Error {
         /// The column, counted from 0.
         column: usize,
     },
+    /// A point to verify does not match the unknowns.
+    #[error("the point does not match the unknowns: {expected} matrices of their sizes are needed, {given} are given")]
+    BadPoint {
+        /// Unknowns of the problem.
+        expected: usize,
+        /// Matrices given.
+        given: usize,
+    },
     /// An option is outside its range.
     #[error("option {option} is {value}: {allowed}")]
     BadOption {

@@ -1,6 +1,6 @@
 //! Why a problem has no solution, in terms of its own inequalities.
 
-use crate::answer::{Answer, Outcome};
+use crate::answer::{Answer, Outcome, Residuals};
 use crate::expression::Expr;
 use crate::problem::{Inequality, Problem};
 use crate::{Error, Mat, Options};
@@ -68,34 +68,13 @@ impl Problem {
     ///
     /// Those of [`Problem::solve`].
     pub fn explain(&self, answer: &Answer, options: &Options) -> Result<Option<Explanation>, Error> {
-        if !matches!(answer.outcome, Outcome::Infeasible(_)) {
-            return Ok(None);
-        }
-        let Some(together) = self.least_relaxation(&|_| true, options)? else {
-            return Ok(None);
-        };
-        let weight = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
-        let weights: Vec<f64> = together.multipliers.iter().map(weight).collect();
-        let total: f64 = weights.iter().sum();
-        let mut order: Vec<usize> = (0..self.inequalities.len()).collect();
-        order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
-        let mut carriers = Vec::new();
-        for (place, block) in order.into_iter().enumerate() {
-            let share = weights[block] / total;
-            if share.is_nan() || share < LEAST_SHARE {
-                break;
-            }
-            let alone = match place < TRIED {
-                true => self.least_relaxation(&|other| other == block, options)?.map(|answer| answer.objective),
-                false => None,
-            };
-            carriers.push(Carrier { name: self.inequalities[block].name.clone(), share, alone });
-        }
-        Ok(Some(Explanation { distance: together.objective, carriers }))
+        let names: Vec<String> = self.inequalities.iter().map(|inequality| inequality.name.clone()).collect();
+        let options = Options { back_off: None, bound: None, ..options.clone() };
+        explain(answer, &names, &|relaxed| self.least_relaxation(relaxed, &options))
     }
 
     /// Minimises t with tI added to some inequalities.
-    fn least_relaxation(&self, relaxed: &dyn Fn(usize) -> bool, options: &Options) -> Result<Option<Answer>, Error> {
+    fn least_relaxation(&self, relaxed: &dyn Fn(usize) -> bool, options: &Options) -> Result<Answer, Error> {
         let mut problem = self.without_inequalities();
         let t = problem.scalar("relaxation");
         for (block, Inequality { name, expression, margin }) in self.inequalities.iter().enumerate() {
@@ -116,10 +95,49 @@ impl Problem {
         problem.minimize(&t);
         let mut answer = problem.solve(options)?;
         answer.multipliers.pop();
-        let near =
-            |answer: &Answer| answer.residuals.primal.max(answer.residuals.dual).max(answer.residuals.gap) < 1e-4;
-        let found = matches!(answer.outcome, Outcome::Solved)
-            || (matches!(answer.outcome, Outcome::Inaccurate(_)) && near(&answer));
-        Ok(found.then_some(answer))
+        Ok(answer)
     }
+}
+
+/// The explanation of an infeasible answer, from what solves for the least relaxation of some inequalities.
+pub(crate) fn explain(
+    answer: &Answer,
+    names: &[String],
+    relax: &dyn Fn(&dyn Fn(usize) -> bool) -> Result<Answer, Error>,
+) -> Result<Option<Explanation>, Error> {
+    if !matches!(answer.outcome, Outcome::Infeasible(_)) {
+        return Ok(None);
+    }
+    let least = |relaxed: &dyn Fn(usize) -> bool| -> Result<Option<Answer>, Error> {
+        let answer = relax(relaxed)?;
+        let Residuals { primal, dual, gap, uncertainty } = answer.residuals;
+        let near = primal.max(dual).max(gap).max(uncertainty) < 1e-4;
+        let found = match answer.outcome {
+            Outcome::Solved => true,
+            Outcome::Inaccurate(_) => near,
+            _ => false,
+        };
+        Ok(found.then_some(answer))
+    };
+    let Some(together) = least(&|_| true)? else {
+        return Ok(None);
+    };
+    let weight = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
+    let weights: Vec<f64> = together.multipliers.iter().map(weight).collect();
+    let total: f64 = weights.iter().sum();
+    let mut order: Vec<usize> = (0..names.len()).collect();
+    order.sort_by(|&a, &b| weights[b].total_cmp(&weights[a]));
+    let mut carriers = Vec::new();
+    for (place, block) in order.into_iter().enumerate() {
+        let share = weights[block] / total;
+        if share.is_nan() || share < LEAST_SHARE {
+            break;
+        }
+        let alone = match place < TRIED {
+            true => least(&|other| other == block)?.map(|answer| answer.objective),
+            false => None,
+        };
+        carriers.push(Carrier { name: names[block].clone(), share, alone });
+    }
+    Ok(Some(Explanation { distance: together.objective, carriers }))
 }

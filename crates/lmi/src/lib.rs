@@ -54,6 +54,7 @@ mod answer;
 mod assembly;
 mod balancing;
 mod block;
+mod conditioning;
 mod dense;
 mod direction;
 mod double_double;

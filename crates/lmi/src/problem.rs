@@ -4,7 +4,7 @@ use crate::answer::{Answer, BlockReport, InaccurateReason, Outcome};
 use crate::expression::{Expr, Unknown};
 use crate::interior_point::Centre;
 use crate::lowering::{Layout, lower};
-use crate::report::{Original, Translation, report};
+use crate::report::{Original, Translation, report, verify};
 use crate::rigorous::{Enclosure, Gradient};
 use crate::verification::Spectrum;
 use crate::{Error, Mat, Options, balancing};
@@ -29,13 +29,13 @@ pub(crate) enum Sense {
 /// An LMI problem: matrix unknowns, inequalities on affine expressions in them, a linear objective.
 ///
 /// See the [crate's front page](crate) for an example. Without an objective the problem is one of feasibility.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Problem {
     id: u64,
-    names: Vec<String>,
-    unknowns: Vec<Unknown>,
+    pub(crate) names: Vec<String>,
+    pub(crate) unknowns: Vec<Unknown>,
     pub(crate) inequalities: Vec<Inequality>,
-    objective: Option<(Sense, Expr)>,
+    pub(crate) objective: Option<(Sense, Expr)>,
 }
 
 impl Default for Problem {
@@ -110,17 +110,7 @@ impl Problem {
     /// square and symmetric, an objective that is not 1 × 1, an unknown of another problem, an option out of range.
     /// Infeasible, unbounded and inaccurate are outcomes.
     pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
-        options.check()?;
-        let answer = self.solve_once(None, options)?;
-        let unproved = matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::NotVerified));
-        if unproved && options.margin > 0.0 {
-            // The default margin may have been too much for a set that is thin: F(x) ≻ 0 is proved or not, whatever was imposed.
-            let again = self.solve_once(None, &Options { margin: 0.0, ..options.clone() })?;
-            if matches!(again.outcome, Outcome::Solved) {
-                return Ok(again);
-            }
-        }
-        Ok(answer)
+        self.solve_in_stages(None, options)
     }
 
     /// Solves the problem as [`Self::solve`] does, beginning near the answer to a neighbouring problem: the same unknowns and inequalities
@@ -133,14 +123,71 @@ impl Problem {
     ///
     /// Those of [`Self::solve`].
     pub fn solve_near(&self, neighbour: &Answer, options: &Options) -> Result<Answer, Error> {
-        if let Some(centre) = &neighbour.centre {
-            options.check()?;
-            let answer = self.solve_once(Some(centre), options)?;
-            if matches!(answer.outcome, Outcome::Solved) {
-                return Ok(answer);
+        self.solve_in_stages(neighbour.centre.as_ref(), options)
+    }
+
+    /// Proves lower bounds on the smallest eigenvalues of the inequalities at any point, whoever found it: one matrix for each unknown in the
+    /// order made.
+    ///
+    /// # Errors
+    ///
+    /// A number or size of matrices that does not match the unknowns.
+    pub fn verify(&self, values: &[Mat<f64>]) -> Result<Vec<BlockReport>, Error> {
+        let sizes = |m: &Mat<f64>, u: &Unknown| (m.nrows(), m.ncols()) == (u.rows, u.cols);
+        if values.len() != self.unknowns.len() || !values.iter().zip(&self.unknowns).all(|(m, u)| sizes(m, u)) {
+            return Err(Error::BadPoint { expected: self.unknowns.len(), given: values.len() });
+        }
+        let layout = Layout::new(&self.unknowns);
+        let margins: Vec<f64> = self.inequalities.iter().map(|i| i.margin.unwrap_or(0.0)).collect();
+        Ok(verify(&Stated { problem: self, layout: &layout, margins: &margins }, values).0)
+    }
+
+    /// The answer with other values of the unknowns, where these are proved to satisfy the inequalities; otherwise as it was.
+    pub(crate) fn moved(&self, answer: Answer, values: Vec<Mat<f64>>) -> Answer {
+        let layout = Layout::new(&self.unknowns);
+        let margins: Vec<f64> = answer.blocks.iter().map(|block| block.margin).collect();
+        let stated = Stated { problem: self, layout: &layout, margins: &margins };
+        let (blocks, verified) = verify(&stated, &values);
+        if !verified {
+            return answer;
+        }
+        let objective = stated.objective(&values);
+        let gap = (objective - answer.dual_objective).abs();
+        let mut residuals = answer.residuals;
+        residuals.gap = gap / (1.0 + objective.abs() + answer.dual_objective.abs());
+        Answer { blocks, objective, gap, residuals, values, ..answer }
+    }
+
+    /// With bounds on the unknowns, and the best-conditioned point after the optimum, where the options ask for them.
+    fn solve_in_stages(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {
+        options.check()?;
+        let bounded = options.bound.map(|bound| self.bounded(bound));
+        let problem = bounded.as_ref().unwrap_or(self);
+        let near = match centre {
+            Some(centre) => Some(problem.solve_once(Some(centre), options)?),
+            None => None,
+        };
+        let answer = match near {
+            Some(answer) if matches!(answer.outcome, Outcome::Solved) => answer,
+            _ => problem.solve_whole(options)?,
+        };
+        match options.back_off {
+            Some(room) => problem.best_conditioned(answer, room, options),
+            None => Ok(answer),
+        }
+    }
+
+    fn solve_whole(&self, options: &Options) -> Result<Answer, Error> {
+        let answer = self.solve_once(None, options)?;
+        let unproved = matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::NotVerified));
+        if unproved && options.margin > 0.0 {
+            // The default margin may have been too much for a set that is thin: F(x) ≻ 0 is proved or not, whatever was imposed.
+            let again = self.solve_once(None, &Options { margin: 0.0, ..options.clone() })?;
+            if matches!(again.outcome, Outcome::Solved) {
+                return Ok(again);
             }
         }
-        self.solve(options)
+        Ok(answer)
     }
 
     fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {

@@ -103,7 +103,7 @@ pub(crate) fn report(
 const BACK_OFF: f64 = 3e-8;
 
 /// The blocks at the unknowns given, and whether each is proved to be as positive definite as it has to be.
-fn verify(original: &dyn Original, values: &[Mat<f64>]) -> (Vec<BlockReport>, bool) {
+pub(crate) fn verify(original: &dyn Original, values: &[Mat<f64>]) -> (Vec<BlockReport>, bool) {
     let mut blocks = original.blocks();
     let mut verified = true;
     for (index, block) in blocks.iter_mut().enumerate() {

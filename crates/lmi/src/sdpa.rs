@@ -26,14 +26,15 @@ pub use writer::write;
 
 use crate::answer::{Answer, BlockReport};
 use crate::block::{Block, DenseBlock, DiagonalBlock, Program};
+use crate::explanation::explain;
 use crate::expression::Unknown;
 use crate::factored::Factored;
 use crate::lowering::{Layout, check_size};
-use crate::report::{Original, Translation, report};
+use crate::report::{Original, Translation, report, verify};
 use crate::rigorous::Enclosure;
 use crate::sparse::{Entry, Sparse, merge};
 use crate::verification::Spectrum;
-use crate::{Error, Mat, Options, balancing, structure};
+use crate::{Error, Explanation, Mat, Options, balancing, structure};
 
 /// The shape of one block of F(x).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +83,9 @@ pub struct Sdp {
 impl Sdp {
     /// Solves the problem. The blocks of the answer are named `block 1`, `block 2`, …; its one unknown is the column x.
     ///
+    /// [`Options::bound`] bounds the entries of x, as one more block; [`Options::back_off`] has no effect: a file says nothing of which
+    /// blocks are to have margins.
+    ///
     /// # Errors
     ///
     /// No block; an entry outside its block, off the diagonal of a diagonal block or of an unknown that does not exist; data
@@ -89,12 +93,81 @@ impl Sdp {
     pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
         options.check()?;
         self.check()?;
+        if let Some(bound) = options.bound {
+            return self.bounded(bound).solve(&Options { bound: None, ..options.clone() });
+        }
         let m = self.objective.len();
         let unknowns = [Unknown { problem: u64::MAX, index: 0, rows: m, cols: 1, symmetric: false }];
         let layout = Layout::new(&unknowns);
         let (result, balancing) = balancing::solve(self.program(), &vec![0.0; self.blocks.len()], options);
         let translation = Translation { layout: &layout, unknowns: &unknowns, objective_constant: 0.0, sign: 1.0 };
         Ok(report(&Stated { sdp: self, options }, &translation, result, balancing, options))
+    }
+
+    /// Proves lower bounds on the smallest eigenvalues of the blocks at any x, whoever found it.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::solve`]; an x of another length.
+    pub fn verify(&self, x: &[f64]) -> Result<Vec<BlockReport>, Error> {
+        self.check()?;
+        if x.len() != self.objective.len() {
+            return Err(Error::BadPoint { expected: self.objective.len(), given: x.len() });
+        }
+        let options = Options::default();
+        Ok(verify(&Stated { sdp: self, options: &options }, &[Mat::from_fn(x.len(), 1, |i, _| x[i])]).0)
+    }
+
+    /// Explains an answer that is [`Outcome::Infeasible`](crate::Outcome::Infeasible); `None` for every other one, and where the least
+    /// relaxation cannot be found. See [`Problem::explain`](crate::Problem::explain).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::solve`].
+    pub fn explain(&self, answer: &Answer, options: &Options) -> Result<Option<Explanation>, Error> {
+        let names: Vec<String> = answer.blocks.iter().map(|block| block.name.clone()).collect();
+        explain(answer, &names, &|relaxed| {
+            let mut answer = self.relaxed(relaxed).solve(&Options { bound: None, ..options.clone() })?;
+            answer.multipliers.truncate(self.blocks.len());
+            Ok(answer)
+        })
+    }
+
+    /// Minimise t with tI added to some blocks, t ≥ −1.
+    fn relaxed(&self, relaxed: &dyn Fn(usize) -> bool) -> Self {
+        let mut problem = self.clone();
+        let t = self.objective.len();
+        problem.objective = vec![0.0; t + 1];
+        problem.objective[t] = 1.0;
+        for (block, shape) in self.blocks.iter().enumerate().filter(|(block, _)| relaxed(*block)) {
+            problem.coefficients.extend((0..shape.size()).map(|row| Coefficient {
+                unknown: Some(t),
+                block,
+                row,
+                column: row,
+                value: 1.0,
+            }));
+        }
+        let block = problem.blocks.len();
+        problem.blocks.push(BlockShape::Diagonal(1));
+        for (unknown, value) in [(None, -1.0), (Some(t), 1.0)] {
+            problem.coefficients.push(Coefficient { unknown, block, row: 0, column: 0, value });
+        }
+        problem
+    }
+
+    /// With −bound ≤ xᵢ ≤ bound as a last, diagonal block.
+    fn bounded(&self, bound: f64) -> Self {
+        let mut problem = self.clone();
+        let (m, block) = (self.objective.len(), self.blocks.len());
+        problem.blocks.push(BlockShape::Diagonal(2 * m));
+        for i in 0..m {
+            for (row, sign) in [(i, 1.0), (m + i, -1.0)] {
+                let entry = |unknown, value| Coefficient { unknown, block, row, column: row, value };
+                problem.coefficients.extend([entry(None, -bound), entry(Some(i), sign)]);
+            }
+        }
+        problem
     }
 
     fn check(&self) -> Result<(), Error> {

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output::print;
 use clap::Args;
-use lmi::{Answer, Options, Outcome, sdpa};
+use lmi::{Answer, Explanation, InaccurateReason, Options, Outcome, sdpa};
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufReader;
@@ -31,10 +31,16 @@ struct SdpRecord {
     gap: f64,
     primal_residual: f64,
     dual_residual: f64,
+    /// What the dual residual may take from the dual objective, relative as the gap.
+    uncertainty: f64,
+    /// Proved lower bounds on the smallest eigenvalues at x, rounding accounted for; null where nothing is proved.
+    verified_lower_bounds: Vec<f64>,
     /// The smallest eigenvalue of each block at x, recomputed from the file's data.
     smallest_eigenvalues: Vec<f64>,
     iterations: usize,
     seconds: f64,
+    /// Of an infeasible problem: how far from feasible, and which blocks to relax.
+    explanation: Option<Explanation>,
 }
 
 /// Solve the problem; every outcome but `solved` is a failure.
@@ -44,7 +50,9 @@ pub fn run(arguments: &SdpArguments) -> Result<(), Failure> {
     let sdp = sdpa::read(BufReader::new(file)).map_err(|error| unreadable(error.to_string()))?;
     let started = Instant::now();
     let answer = sdp.solve(&Options::default()).map_err(|error| unreadable(error.to_string()))?;
-    let record = record(&answer, started.elapsed().as_secs_f64());
+    let seconds = started.elapsed().as_secs_f64();
+    let explanation = sdp.explain(&answer, &Options::default()).map_err(|error| unreadable(error.to_string()))?;
+    let record = record(&answer, seconds, explanation);
 
     if arguments.json {
         print(&serde_json::to_string_pretty(&record).map_err(|error| Failure::serialisation(&error))?)?;
@@ -62,7 +70,7 @@ pub fn run(arguments: &SdpArguments) -> Result<(), Failure> {
     }
 }
 
-fn record(answer: &Answer, seconds: f64) -> SdpRecord {
+fn record(answer: &Answer, seconds: f64, explanation: Option<Explanation>) -> SdpRecord {
     let (status, detail) = match &answer.outcome {
         Outcome::Solved => ("solved", String::new()),
         Outcome::Infeasible(witness) => (
@@ -79,7 +87,7 @@ fn record(answer: &Answer, seconds: f64) -> SdpRecord {
                 ray.smallest_eigenvalue
             ),
         ),
-        Outcome::Inaccurate(reason) => ("inaccurate", format!("the solver stopped short: {reason:?}")),
+        Outcome::Inaccurate(reason) => ("inaccurate", stopped_short(*reason).to_owned()),
     };
     SdpRecord {
         status,
@@ -89,14 +97,34 @@ fn record(answer: &Answer, seconds: f64) -> SdpRecord {
         gap: answer.gap,
         primal_residual: answer.residuals.primal,
         dual_residual: answer.residuals.dual,
+        uncertainty: answer.residuals.uncertainty,
+        verified_lower_bounds: answer.blocks.iter().map(|block| block.verified_lower_bound).collect(),
         smallest_eigenvalues: answer.blocks.iter().map(|block| block.smallest_eigenvalue).collect(),
         iterations: answer.iterations.len(),
         seconds,
+        explanation,
+    }
+}
+
+fn stopped_short(reason: InaccurateReason) -> &'static str {
+    match reason {
+        InaccurateReason::IterationLimit => "the iteration limit was reached; this is the best point so far",
+        InaccurateReason::TimeLimit => "the time limit was reached; this is the best point so far",
+        InaccurateReason::Cancelled => "cancelled; this is the best point so far",
+        InaccurateReason::NotAttained => {
+            "the objective approaches its bound only as x grows without end: no x attains it"
+        }
+        InaccurateReason::Stalled => {
+            "rounding errors stopped progress: the problem has no interior or is badly conditioned; this is the best point"
+        }
+        InaccurateReason::NotVerified => {
+            "the iteration converged, but its point could not be proved to satisfy the inequalities"
+        }
     }
 }
 
 fn text(record: &SdpRecord) -> String {
-    let least = record.smallest_eigenvalues.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    let least = record.verified_lower_bounds.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
     let margin = least.map_or(String::new(), |(block, value)| format!("{value:.3e} in block {}", block + 1));
     let rows = [
         ("status", record.status.to_owned()),
@@ -105,9 +133,15 @@ fn text(record: &SdpRecord) -> String {
         ("dual objective", format!("{:.9e}", record.dual_objective)),
         ("gap", format!("{:.2e}", record.gap)),
         ("residuals", format!("{:.1e} primal, {:.1e} dual", record.primal_residual, record.dual_residual)),
-        ("least λ_min", margin),
+        ("λ_min proved ≥", margin),
         ("iterations", record.iterations.to_string()),
         ("seconds", format!("{:.4}", record.seconds)),
     ];
-    rows.iter().filter(|(_, value)| !value.is_empty()).map(|(name, value)| format!("{name:15} {value}\n")).collect()
+    let explanation = record.explanation.as_ref().map_or(String::new(), |explanation| format!("{explanation}\n"));
+    let rows: String = rows
+        .iter()
+        .filter(|(_, value)| !value.is_empty())
+        .map(|(name, value)| format!("{name:15} {value}\n"))
+        .collect();
+    rows + &explanation
 }

@@ -10,3 +10,4 @@ mod regulator;
 mod scaling;
 mod sdpa_format;
 mod sdplib;
+mod stages;

@@ -38,7 +38,11 @@ pub fn low_gain(gamma: f64) -> (Problem, Expr) {
 
 /// The high-gain design: every mixture of rows of L and M, the rows of M bounded.
 pub fn high_gain(gamma: f64) -> (Problem, Expr) {
-    let plant = quadrotor(0.3);
+    high_gain_at(&quadrotor(0.3), gamma)
+}
+
+/// The same for any yaw.
+pub fn high_gain_at(plant: &Plant, gamma: f64) -> (Problem, Expr) {
     let mut problem = Problem::new();
     let y = problem.symmetric("Y", 12);
     let l = problem.rectangular("L", 4, 12);
@@ -46,7 +50,7 @@ pub fn high_gain(gamma: f64) -> (Problem, Expr) {
     for vertex in 0..16_u32 {
         let v: Vec<f64> = (0..4).map(|i| f64::from(vertex >> i & 1)).collect();
         let s = diagonal(&v) * &l + (Mat::<f64>::identity(4, 4) - diagonal(&v)) * &m;
-        problem.positive_definite(format!("Riccati {v:?}"), riccati(&plant, &y, &s));
+        problem.positive_definite(format!("Riccati {v:?}"), riccati(plant, &y, &s));
     }
     for i in 0..4 {
         problem.positive_definite(format!("saturation {i}"), saturation(&y, m.row(i), gamma));

@@ -16,6 +16,8 @@ fn literature_problems_are_solved() {
         assert_eq!(record["status"], "solved");
         let objective = record["objective"].as_f64().unwrap();
         assert!((objective / optimum - 1.0).abs() < 1e-6, "{name}: {objective} is not {optimum}");
+        assert!(record["verified_lower_bounds"].as_array().unwrap().iter().all(|value| value.as_f64().unwrap() > 0.0));
+        assert!(record["uncertainty"].as_f64().unwrap() < 1e-6 && record["explanation"].is_null());
         assert!(record["smallest_eigenvalues"].as_array().unwrap().iter().all(|value| value.as_f64().unwrap() > 0.0));
         assert!(place.succeed(&format!("sdp {name}")).contains("status          solved"));
     }
@@ -28,6 +30,9 @@ fn problems_without_optimum_end_with_3() {
     place.write("infeasible.dat-s", "1\n1\n-2\n1\n0 1 1 1 1\n1 1 1 1 1\n1 1 2 2 -1\n");
     let ended = place.lpv("sdp infeasible.dat-s");
     ended.refuses(3, &["infeasible"]);
+    // Each side has to give way by 1/2.
+    let record: serde_json::Value = serde_json::from_str(&place.lpv("sdp infeasible.dat-s --json").stdout).unwrap();
+    assert!((record["explanation"]["distance"].as_f64().unwrap() - 0.5).abs() < 1e-6);
     place.write("unbounded.dat-s", "1\n1\n1\n-1\n1 1 1 1 1\n");
     place.lpv("sdp unbounded.dat-s --json").refuses(3, &["unbounded"]);
 }
