@@ -7,9 +7,10 @@
 //! [ S                         0     R⁻¹ ]
 //! ```
 //!
-//! With `--low-gain` S = L = M, one vertex; with `--sweep` a grid of yaw angles, each solved near the one before.
+//! With `--low-gain` S = L = M, one vertex; with `--sweep` a grid of yaw angles, each solved near the one before; with `--write` the
+//! problem goes to standard output in the SDPA sparse format.
 //!
-//! `cargo run --release -p lmi --example saturated_regulator -- [--low-gain] [REPETITIONS | --sweep POINTS]`
+//! `cargo run --release -p lmi --example saturated_regulator -- [--low-gain] [REPETITIONS | --sweep POINTS | --write]`
 
 use lmi::{Expr, Mat, Options, Problem};
 use std::time::Instant;
@@ -98,6 +99,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let low_gain = flags.iter().any(|flag| flag == "--low-gain");
     if flags.iter().any(|flag| flag == "--sweep") {
         return sweep(number, low_gain);
+    }
+    if flags.iter().any(|flag| flag == "--write") {
+        let (problem, _) = design(0.3, low_gain);
+        lmi::sdpa::write(&problem.to_sdp(&Options::default())?, std::io::stdout().lock())?;
+        return Ok(());
     }
     let mut fastest = f64::INFINITY;
     for repetition in 0..number {

@@ -169,6 +169,21 @@ impl Block {
         }
     }
 
+    /// Visits the entries of the coefficient matrices themselves as (row, column, unknown or `None` for C, value), row ≥ column; an entry
+    /// may come in parts.
+    pub fn coefficients(&self, visit: &mut dyn FnMut(usize, usize, Option<usize>, f64)) {
+        let Self::Dense(block) = self else { return self.entries(visit) };
+        let n = block.size;
+        for j in 0..n {
+            (j..n).for_each(|i| visit(i, j, None, block.constant[i + j * n]));
+        }
+        // U X Vᵀ + V Xᵀ Uᵀ meets the diagonal twice.
+        block.factored.entries(&mut |i, j, unknown, value| {
+            visit(i, j, unknown, if i == j { 2.0 * value } else { value });
+        });
+        block.sparse.entries(visit);
+    }
+
     /// F ← F − margin·I.
     pub fn subtract(&mut self, margin: f64) {
         match self {

@@ -6,8 +6,10 @@ use crate::interior_point::Centre;
 use crate::lowering::{Layout, lower};
 use crate::report::{Original, Translation, report, verify};
 use crate::rigorous::{Enclosure, Gradient};
+use crate::sdpa::{BlockShape, Coefficient, Sdp};
 use crate::verification::Spectrum;
 use crate::{Error, Mat, Options, balancing};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// An inequality `F(x) ⪰ margin·I`.
@@ -124,6 +126,36 @@ impl Problem {
     /// Those of [`Self::solve`].
     pub fn solve_near(&self, neighbour: &Answer, options: &Options) -> Result<Answer, Error> {
         self.solve_in_stages(neighbour.centre.as_ref(), options)
+    }
+
+    /// The problem coefficient by coefficient, to be written as a `.dat-s` file for other solvers: minimise cᵀx, with the scalars of
+    /// each unknown in the order made, row by row, of a symmetric one its lower triangle. Margins that were given are part of
+    /// F₀; strict inequalities are posed with margin zero. The constant of the objective is lost, and a maximised one changes its sign.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::solve`].
+    pub fn to_sdp(&self, options: &Options) -> Result<Sdp, Error> {
+        let lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
+        let mut coefficients: BTreeMap<(Option<usize>, usize, usize, usize), f64> = BTreeMap::new();
+        for (block, (form, inequality)) in lowered.program.blocks.iter().zip(&self.inequalities).enumerate() {
+            form.coefficients(&mut |row, column, unknown, value| {
+                let value = if unknown.is_none() { -value } else { value };
+                *coefficients.entry((unknown, block, column, row)).or_default() += value;
+            });
+            let margin = inequality.margin.unwrap_or(0.0);
+            for i in 0..form.size() {
+                *coefficients.entry((None, block, i, i)).or_default() += margin;
+            }
+        }
+        let coefficients = coefficients.into_iter().filter(|(_, value)| *value != 0.0);
+        Ok(Sdp {
+            objective: lowered.program.objective,
+            blocks: lowered.program.blocks.iter().map(|block| BlockShape::Symmetric(block.size())).collect(),
+            coefficients: coefficients
+                .map(|((unknown, block, row, column), value)| Coefficient { unknown, block, row, column, value })
+                .collect(),
+        })
     }
 
     /// Proves lower bounds on the smallest eigenvalues of the inequalities at any point, whoever found it: one matrix for each unknown in the

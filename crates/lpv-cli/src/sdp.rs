@@ -28,6 +28,8 @@ struct SdpRecord {
     /// cᵀx
     objective: f64,
     dual_objective: f64,
+    /// The point that all of this is about.
+    x: Vec<f64>,
     gap: f64,
     primal_residual: f64,
     dual_residual: f64,
@@ -94,6 +96,7 @@ fn record(answer: &Answer, seconds: f64, explanation: Option<Explanation>) -> Sd
         detail,
         objective: answer.objective,
         dual_objective: answer.dual_objective,
+        x: answer.unknown_values().iter().flat_map(|x| (0..x.nrows()).map(|i| x[(i, 0)])).collect(),
         gap: answer.gap,
         primal_residual: answer.residuals.primal,
         dual_residual: answer.residuals.dual,

@@ -116,6 +116,28 @@ fn points_of_others_are_verified() {
     assert!(matches!(problem.verify(&[Mat::zeros(3, 3)]), Err(Error::BadPoint { .. })));
 }
 
+/// Expressions and the file written from them have one optimum, and the file is what other solvers' makers wrote by hand.
+#[test]
+fn a_problem_written_as_a_file_is_the_same() {
+    let (problem, _) = low_gain(20.0);
+    let sdp = problem.to_sdp(&Options::default()).unwrap();
+    let mut text = Vec::new();
+    sdpa::write(&sdp, &mut text).unwrap();
+    assert_eq!(sdpa::read(&text[..]).unwrap(), sdp);
+    let [here, there] = [problem.solve(&Options::default()).unwrap(), sdp.solve(&Options::default()).unwrap()];
+    assert!(matches!(there.outcome, Outcome::Solved));
+    // A maximised objective changes its sign.
+    assert!((here.objective + there.objective).abs() < 2e-7, "{} {}", here.objective, there.objective);
+    let given = {
+        let mut problem = Problem::new();
+        let t = problem.scalar("t");
+        problem.positive_definite_by("t > 3", t.clone(), 3.0);
+        problem.minimize(&t);
+        problem.to_sdp(&Options::default()).unwrap()
+    };
+    assert!((given.solve(&Options::default()).unwrap().objective - 3.0).abs() < 1e-7);
+}
+
 #[test]
 fn files_are_bounded_verified_and_explained() {
     // Minimise x₁ over x₁ ≥ x₂, x₁ + x₂ ≥ 0: 0; with |xᵢ| ≤ 5 and x₁ ≥ 7 besides, infeasible by 1.
