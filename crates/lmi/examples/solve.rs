@@ -30,8 +30,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let outcome = outcome.split('{').next().unwrap_or_default();
         let proved = answer.blocks.iter().map(|block| block.verified_lower_bound).fold(f64::INFINITY, f64::min);
         let smallest = answer.blocks.iter().map(|block| block.smallest_eigenvalue).fold(f64::INFINITY, f64::min);
+        let bound = answer.optimum_bound.map_or("none".to_owned(), |bound| format!("{:.9e}", bound.value));
         println!(
-            "{path}: {outcome}, objective {:.9e}, dual {:.9e}, gap {:.1e}, residuals {:.1e} {:.1e}, smallest eigenvalue {smallest:.1e}, proved {proved:.1e}, \
+            "{path}: {outcome}, objective {:.9e}, dual {:.9e}, proved bound {bound}, gap {:.1e}, residuals {:.1e} {:.1e}, smallest eigenvalue {smallest:.1e}, proved {proved:.1e}, \
              {} iterations, {:.3} s",
             answer.objective,
             answer.dual_objective,

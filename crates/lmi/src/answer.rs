@@ -102,6 +102,19 @@ pub struct Residuals {
     pub uncertainty: f64,
 }
 
+/// A proved bound on the optimum: weak duality with every rounding accounted for.
+///
+/// No x that satisfies the inequalities (strict ones also with equality) has a smaller objective (a larger one when it is
+/// maximised), as long as no entry of an unknown is more than `reach` times as large as the largest one of that unknown in the answer. The
+/// restriction is what computed multipliers, which meet `A(Z) = c` to rounding only, can prove.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct OptimumBound {
+    /// The bound.
+    pub value: f64,
+    /// How much larger than the answer x may be.
+    pub reach: f64,
+}
+
 /// What balancing did to the problem before it was solved; it is undone in the answer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Balancing {
@@ -141,6 +154,8 @@ pub struct Answer {
     pub dual_objective: f64,
     /// |objective − dual_objective|.
     pub gap: f64,
+    /// A proved bound on what any point can reach, of a solved problem.
+    pub optimum_bound: Option<OptimumBound>,
     /// Every inequality, in the order stated.
     pub blocks: Vec<BlockReport>,
     /// Coefficient ranges before and after balancing.

@@ -80,7 +80,9 @@ mod structure;
 mod vectorized;
 mod verification;
 
-pub use answer::{Answer, Balancing, BlockReport, InaccurateReason, IterationLog, Outcome, Ray, Residuals, Witness};
+pub use answer::{
+    Answer, Balancing, BlockReport, InaccurateReason, IterationLog, OptimumBound, Outcome, Ray, Residuals, Witness,
+};
 pub use error::Error;
 pub use explanation::{Carrier, Explanation};
 pub use expression::Expr;

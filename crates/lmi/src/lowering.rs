@@ -53,6 +53,19 @@ impl Layout {
         self.unknowns.iter().map(|&u| Mat::from_fn(u.rows, u.cols, entry(u))).collect()
     }
 
+    /// The scalars of matrices, symmetric where their unknowns are.
+    pub fn values(&self, matrices: &[Mat<f64>]) -> Vec<f64> {
+        let mut out = vec![0.0; self.len];
+        for (&unknown, matrix) in self.unknowns.iter().zip(matrices) {
+            for i in 0..unknown.rows {
+                for j in 0..unknown.cols {
+                    out[self.position(unknown, i, j)] = matrix[(i, j)];
+                }
+            }
+        }
+        out
+    }
+
     /// From a gradient with respect to each matrix to the gradient with respect to x: the entries (i, j) and (j, i) of
     /// a symmetric unknown are one scalar.
     pub fn scalars(&self, gradients: &[Mat<f64>]) -> Vec<f64> {

@@ -171,14 +171,14 @@ impl Problem {
         }
         let layout = Layout::new(&self.unknowns);
         let margins: Vec<f64> = self.inequalities.iter().map(|i| i.margin.unwrap_or(0.0)).collect();
-        Ok(verify(&Stated { problem: self, layout: &layout, margins: &margins }, values).0)
+        Ok(verify(&Stated { problem: self, layout: &layout, margins: &margins, costs: &[] }, values).0)
     }
 
     /// The answer with other values of the unknowns, where these are proved to satisfy the inequalities; otherwise as it was.
     pub(crate) fn moved(&self, answer: Answer, values: Vec<Mat<f64>>) -> Answer {
         let layout = Layout::new(&self.unknowns);
         let margins: Vec<f64> = answer.blocks.iter().map(|block| block.margin).collect();
-        let stated = Stated { problem: self, layout: &layout, margins: &margins };
+        let stated = Stated { problem: self, layout: &layout, margins: &margins, costs: &[] };
         let (blocks, verified) = verify(&stated, &values);
         if !verified {
             return answer;
@@ -225,6 +225,7 @@ impl Problem {
     fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {
         let mut lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
         lowered.program.warm = centre.cloned();
+        let costs = lowered.program.objective.clone();
         let (result, balancing) = balancing::solve(lowered.program, &lowered.margins, options);
         let translation = Translation {
             layout: &lowered.layout,
@@ -233,7 +234,7 @@ impl Problem {
             sign: lowered.sign,
         };
         Ok(report(
-            &Stated { problem: self, layout: &lowered.layout, margins: &lowered.margins },
+            &Stated { problem: self, layout: &lowered.layout, margins: &lowered.margins, costs: &costs },
             &translation,
             result,
             balancing,
@@ -260,6 +261,7 @@ struct Stated<'a> {
     problem: &'a Problem,
     layout: &'a Layout,
     margins: &'a [f64],
+    costs: &'a [f64],
 }
 
 impl Original for Stated<'_> {
@@ -287,12 +289,21 @@ impl Original for Stated<'_> {
         objective.map_or(0.0, |(_, expression)| expression.evaluate(&|unknown| &values[unknown.index])[(0, 0)])
     }
 
-    fn gradient_bounds(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
+    fn costs(&self) -> &[f64] {
+        self.costs
+    }
+
+    fn gradient_bounds(&self, multipliers: &[Mat<f64>], offset: Option<&[f64]>) -> Vec<f64> {
         let expressions = self.problem.inequalities.iter().map(|inequality| &inequality.expression);
         let gradient = Gradient::new(&self.problem.unknowns, expressions.zip(multipliers));
         let values = self.layout.scalars(&gradient.values);
         let radii = self.layout.scalars(&gradient.radii);
-        values.iter().zip(radii).map(|(value, radius)| 1.001 * (value.abs() + radius)).collect()
+        let bound = |(i, (value, radius)): (usize, (&f64, f64))| {
+            let offset = offset.map_or(0.0, |offset| offset[i]);
+            // The offset is a sum of two weights at most.
+            1.001 * ((value - offset).abs() + radius + 4.0 * f64::EPSILON * offset.abs())
+        };
+        values.iter().zip(radii).enumerate().map(bound).collect()
     }
 
     fn strict(&self, block: usize) -> bool {

@@ -1,6 +1,6 @@
 //! From the solver's point to an answer: every claim is recomputed on the data as they were stated.
 
-use crate::answer::{Answer, Balancing, BlockReport, InaccurateReason, Outcome, Ray, Witness};
+use crate::answer::{Answer, Balancing, BlockReport, InaccurateReason, OptimumBound, Outcome, Ray, Witness};
 use crate::expression::Unknown;
 use crate::interior_point::{Ending, SOLVED_GAP, Solution};
 use crate::lowering::Layout;
@@ -18,8 +18,10 @@ pub(crate) trait Original {
     fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure;
     /// The objective at the unknowns given, in the sense stated.
     fn objective(&self, values: &[Mat<f64>]) -> f64;
-    /// Proved upper bounds on the absolute values of the gradient of `Σ_b⟨F_b, Z_b⟩` with respect to the scalar unknowns.
-    fn gradient_bounds(&self, multipliers: &[Mat<f64>]) -> Vec<f64>;
+    /// Proved upper bounds on `|Σ_b⟨F_{b,i}, Z_b⟩ − offsetᵢ|`, the offset zero if there is none.
+    fn gradient_bounds(&self, multipliers: &[Mat<f64>], offset: Option<&[f64]>) -> Vec<f64>;
+    /// c of the minimised objective.
+    fn costs(&self) -> &[f64];
     /// Whether the margin of a block stands for a strict inequality.
     fn strict(&self, block: usize) -> bool;
     /// By how much the smallest eigenvalue of a block of an answer must exceed zero: `None` for a strict inequality.
@@ -78,6 +80,10 @@ pub(crate) fn report(
         }
         Ending::Stopped(reason) => Outcome::Inaccurate(reason),
     };
+    let optimum_bound = match outcome {
+        Outcome::Solved => optimum_bound(original, translation, &blocks, &multipliers, &values),
+        _ => None,
+    };
     let mut iterations = result.log;
     for entry in &mut iterations {
         entry.objective = stated(entry.objective);
@@ -88,6 +94,7 @@ pub(crate) fn report(
         objective,
         dual_objective,
         gap,
+        optimum_bound,
         blocks,
         balancing,
         residuals,
@@ -124,6 +131,36 @@ fn spectrum(value: &Mat<f64>, size: usize) -> Spectrum {
     if value.ncols() == size { Spectrum::of(value) } else { Spectrum::of_diagonal(value) }
 }
 
+/// How much larger than the answer the points are that the bound on the optimum speaks of.
+const REACH: f64 = 10.0;
+
+/// For every x with `F_b(x) ⪰ 0`, and every Z_b ⪰ 0, `cᵀx = Σ⟨F_b(x) − C_b, Z_b⟩ + Σ(c − A(Z))ᵢxᵢ ≥ −Σ⟨C_b, Z_b⟩ − Σ|c − A(Z)|ᵢ|xᵢ|`.
+fn optimum_bound(
+    original: &dyn Original,
+    translation: &Translation<'_>,
+    blocks: &[BlockReport],
+    multipliers: &[Mat<f64>],
+    values: &[Mat<f64>],
+) -> Option<OptimumBound> {
+    let definite: Vec<Mat<f64>> = multipliers.iter().map(made_definite).collect::<Option<_>>()?;
+    let at_zero = at_zero(original, translation.layout, blocks, &definite);
+    let misses = original.gradient_bounds(&definite, Some(original.costs()));
+    let largest: Vec<Mat<f64>> = values
+        .iter()
+        .map(|x| {
+            let most = REACH * largest_entry(x);
+            Mat::from_fn(x.nrows(), x.ncols(), |_, _| most)
+        })
+        .collect();
+    let reach = translation.layout.values(&largest);
+    let taken: f64 = misses.iter().zip(&reach).map(|(miss, x)| miss * x).sum();
+    let least = -at_zero.known - at_zero.error - 1.001 * taken;
+    let value = translation.objective_constant + translation.sign * least;
+    // The last two roundings.
+    let value = value - translation.sign * 4.0 * f64::EPSILON * (value.abs() + least.abs());
+    value.is_finite().then_some(OptimumBound { value, reach: REACH })
+}
+
 /// Least radius of the excluded box, in the units of the balanced unknowns, that is called infeasible.
 const EXCLUDED: f64 = 1e10;
 
@@ -147,7 +184,7 @@ fn witness(
     if needs_margin && at_zero.known.abs() > 1e-14 * at_zero.magnitude {
         return None;
     }
-    let bounds = original.gradient_bounds(&multipliers);
+    let bounds = original.gradient_bounds(&multipliers, None);
     let residual = bounds.iter().fold(0.0, |m: f64, g| if g.is_nan() { *g } else { m.max(*g) });
     let reach: f64 = bounds.iter().zip(units).map(|(bound, unit)| bound * unit).sum();
     let excluded_radius = 0.999 * -(at_zero.total + at_zero.error) / reach;

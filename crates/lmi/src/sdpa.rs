@@ -312,15 +312,22 @@ impl Original for Stated<'_> {
         self.sdp.objective.iter().enumerate().map(|(i, c)| c * values[0][(i, 0)]).sum()
     }
 
-    fn gradient_bounds(&self, multipliers: &[Mat<f64>]) -> Vec<f64> {
+    fn costs(&self) -> &[f64] {
+        &self.sdp.objective
+    }
+
+    fn gradient_bounds(&self, multipliers: &[Mat<f64>], offset: Option<&[f64]>) -> Vec<f64> {
         let mut gradient = Enclosure::zeros(self.sdp.objective.len(), true);
+        for (unknown, offset) in offset.unwrap_or_default().iter().enumerate() {
+            gradient.add_product(unknown, unknown, -1.0, *offset);
+        }
         for c in &self.sdp.coefficients {
             if let Some(unknown) = c.unknown {
                 let count = if c.row == c.column { 1.0 } else { 2.0 };
                 gradient.add_product(unknown, unknown, count * c.value, multipliers[c.block][(c.row, c.column)]);
             }
         }
-        gradient.count(self.sdp.coefficients.len());
+        gradient.count(self.sdp.coefficients.len() + 1);
         gradient.absolute_bounds()
     }
 

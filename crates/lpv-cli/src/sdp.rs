@@ -28,6 +28,8 @@ struct SdpRecord {
     /// cᵀx
     objective: f64,
     dual_objective: f64,
+    /// Proved: no x whose entries are at most ten times as large as this one's does better.
+    optimum_bound: Option<f64>,
     /// The point that all of this is about.
     x: Vec<f64>,
     gap: f64,
@@ -96,6 +98,7 @@ fn record(answer: &Answer, seconds: f64, explanation: Option<Explanation>) -> Sd
         detail,
         objective: answer.objective,
         dual_objective: answer.dual_objective,
+        optimum_bound: answer.optimum_bound.map(|bound| bound.value),
         x: answer.unknown_values().iter().flat_map(|x| (0..x.nrows()).map(|i| x[(i, 0)])).collect(),
         gap: answer.gap,
         primal_residual: answer.residuals.primal,
@@ -134,6 +137,7 @@ fn text(record: &SdpRecord) -> String {
         ("detail", record.detail.clone()),
         ("objective", format!("{:.9e}", record.objective)),
         ("dual objective", format!("{:.9e}", record.dual_objective)),
+        ("optimum proved ≥", record.optimum_bound.map_or(String::new(), |bound| format!("{bound:.9e}"))),
         ("gap", format!("{:.2e}", record.gap)),
         ("residuals", format!("{:.1e} primal, {:.1e} dual", record.primal_residual, record.dual_residual)),
         ("λ_min proved ≥", margin),
@@ -144,7 +148,7 @@ fn text(record: &SdpRecord) -> String {
     let rows: String = rows
         .iter()
         .filter(|(_, value)| !value.is_empty())
-        .map(|(name, value)| format!("{name:15} {value}\n"))
+        .map(|(name, value)| format!("{name:16} {value}\n"))
         .collect();
     rows + &explanation
 }

@@ -119,8 +119,14 @@ proptest! {
         for answer in instance.outcomes() {
             // Without an interior the solver may stop short, but never claim a wrong optimum.
             match &answer.outcome {
-                Outcome::Solved => prop_assert!((answer.objective - optimum).abs() < 3e-6 * (1.0 + optimum.abs()),
-                    "{} {optimum}", answer.objective),
+                Outcome::Solved => {
+                    prop_assert!((answer.objective - optimum).abs() < 3e-6 * (1.0 + optimum.abs()),
+                        "{} {optimum}", answer.objective);
+                    // x* is feasible but for its own rounding.
+                    let bound = answer.optimum_bound.unwrap().value;
+                    prop_assert!(bound <= optimum + 1e-13 * (1.0 + optimum.abs()), "{bound:e} {optimum:e}");
+                    prop_assert!(bound >= optimum - 1e-4 * (1.0 + optimum.abs()), "{bound:e} {optimum:e}");
+                }
                 Outcome::Inaccurate(_) => prop_assert!((answer.objective - optimum).abs() < 1e-3 * (1.0 + optimum.abs())),
                 other => prop_assert!(false, "{other:?}"),
             }

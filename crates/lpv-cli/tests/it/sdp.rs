@@ -15,11 +15,13 @@ fn literature_problems_are_solved() {
         let record = parsed(&place.succeed(&format!("sdp {name} --json")));
         assert_eq!(record["status"], "solved");
         let objective = record["objective"].as_f64().unwrap();
+        let bound = record["optimum_bound"].as_f64().unwrap();
+        assert!(bound <= objective && objective - bound < 1e-6 * (1.0 + objective.abs()));
         assert!((objective / optimum - 1.0).abs() < 1e-6, "{name}: {objective} is not {optimum}");
         assert!(record["verified_lower_bounds"].as_array().unwrap().iter().all(|value| value.as_f64().unwrap() > 0.0));
         assert!(record["uncertainty"].as_f64().unwrap() < 1e-6 && record["explanation"].is_null());
         assert!(record["smallest_eigenvalues"].as_array().unwrap().iter().all(|value| value.as_f64().unwrap() > 0.0));
-        assert!(place.succeed(&format!("sdp {name}")).contains("status          solved"));
+        assert!(place.succeed(&format!("sdp {name}")).contains("status           solved"));
     }
 }
 
