@@ -84,6 +84,7 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
                 InaccurateReason::TimeLimit => "it reached its time limit",
                 InaccurateReason::Cancelled => "it was cancelled",
                 InaccurateReason::Stalled => "rounding errors stopped its progress",
+                InaccurateReason::NotAttained => "its objective has a bound that no matrices attain",
                 InaccurateReason::NotVerified => "its answer did not pass the check of its blocks",
             };
             Err(SynthesisError::Inaccurate { rho, reason: reason.into() })
