@@ -4,6 +4,7 @@ use crate::Mat;
 use crate::expression::{Expr, Unknown};
 use crate::interior_point::Centre;
 use serde::Serialize;
+use std::fmt;
 
 /// How a solve ended.
 #[derive(Clone, Debug, Serialize)]
@@ -70,6 +71,22 @@ pub enum InaccurateReason {
     /// The solver converged, but what it found cannot be proved on the data as stated: a block is not positive definite by its margin, or
     /// a witness of infeasibility excludes too little.
     NotVerified,
+}
+
+impl fmt::Display for InaccurateReason {
+    /// Completes "the solver stopped short: …".
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::IterationLimit => "it reached its iteration limit",
+            Self::TimeLimit => "it reached its time limit",
+            Self::Cancelled => "it was cancelled",
+            Self::NotAttained => {
+                "the objective comes closer to its bound only as the unknowns grow without end; bound them, or ask for less"
+            }
+            Self::Stalled => "rounding errors stopped its progress: the problem has no interior or is badly conditioned",
+            Self::NotVerified => "its answer did not pass the check of its blocks",
+        })
+    }
 }
 
 /// One inequality at the answer.

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::output::print;
 use clap::Args;
-use lmi::{Answer, Explanation, InaccurateReason, Options, Outcome, sdpa};
+use lmi::{Answer, Explanation, Options, Outcome, sdpa};
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufReader;
@@ -91,7 +91,7 @@ fn record(answer: &Answer, seconds: f64, explanation: Option<Explanation>) -> Sd
                 ray.smallest_eigenvalue
             ),
         ),
-        Outcome::Inaccurate(reason) => ("inaccurate", stopped_short(*reason).to_owned()),
+        Outcome::Inaccurate(reason) => ("inaccurate", format!("the solver stopped short: {reason}")),
     };
     SdpRecord {
         status,
@@ -109,23 +109,6 @@ fn record(answer: &Answer, seconds: f64, explanation: Option<Explanation>) -> Sd
         iterations: answer.iterations.len(),
         seconds,
         explanation,
-    }
-}
-
-fn stopped_short(reason: InaccurateReason) -> &'static str {
-    match reason {
-        InaccurateReason::IterationLimit => "the iteration limit was reached; this is the best point so far",
-        InaccurateReason::TimeLimit => "the time limit was reached; this is the best point so far",
-        InaccurateReason::Cancelled => "cancelled; this is the best point so far",
-        InaccurateReason::NotAttained => {
-            "the objective approaches its bound only as x grows without end: no x attains it"
-        }
-        InaccurateReason::Stalled => {
-            "rounding errors stopped progress: the problem has no interior or is badly conditioned; this is the best point"
-        }
-        InaccurateReason::NotVerified => {
-            "the iteration converged, but its point could not be proved to satisfy the inequalities"
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{ProblemPlan, Scope};
 use crate::failure::Failure;
-use lmi::{Answer, Explanation, InaccurateReason, Outcome, Witness};
+use lmi::{Answer, Explanation, Outcome, Witness};
 use lpv::certificate::Verdict;
 use lpv::math::Mat;
 use lpv::math::matrix::{quadratic_form, to_rows};
@@ -220,13 +220,6 @@ fn verdict(plan: &ProblemPlan, answer: &Answer, inside: Option<bool>) -> (Verdic
             (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope; K is rounded".into())
         }
         (Outcome::Inaccurate(reason), _, _) => {
-            let reason = match reason {
-                InaccurateReason::IterationLimit => "it reached its iteration limit",
-                InaccurateReason::TimeLimit => "it reached its time limit",
-                InaccurateReason::Cancelled => "it was cancelled",
-                InaccurateReason::Stalled => "rounding errors stopped its progress",
-                InaccurateReason::NotVerified => "its answer did not pass the check of its blocks",
-            };
             (Verdict::Undecided, format!("the solver stopped short: {reason}"))
         }
         (Outcome::Infeasible(_), _, _) => (Verdict::Refuted, "no solution exists: the witness contradicts the inequalities".into()),

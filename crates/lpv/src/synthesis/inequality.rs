@@ -4,7 +4,7 @@ use super::SynthesisError;
 use crate::math::Mat;
 use crate::math::matrix::inverse_spd;
 use crate::model::FrozenModel;
-use lmi::{Answer, Expr, InaccurateReason, Options, Outcome, Problem};
+use lmi::{Answer, Expr, Options, Outcome, Problem};
 
 /// Q⁻¹ and R⁻¹, which the inequalities hold as constants.
 pub(super) struct InverseWeights {
@@ -78,16 +78,6 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
             Err(SynthesisError::Infeasible { rho, carriers })
         }
         Outcome::Unbounded(_) => Err(SynthesisError::Unbounded { rho }),
-        Outcome::Inaccurate(reason) => {
-            let reason = match reason {
-                InaccurateReason::IterationLimit => "it reached its iteration limit",
-                InaccurateReason::TimeLimit => "it reached its time limit",
-                InaccurateReason::Cancelled => "it was cancelled",
-                InaccurateReason::Stalled => "rounding errors stopped its progress",
-                InaccurateReason::NotAttained => "its objective has a bound that no matrices attain",
-                InaccurateReason::NotVerified => "its answer did not pass the check of its blocks",
-            };
-            Err(SynthesisError::Inaccurate { rho, reason: reason.into() })
-        }
+        Outcome::Inaccurate(reason) => Err(SynthesisError::Inaccurate { rho, reason: reason.to_string() }),
     }
 }
