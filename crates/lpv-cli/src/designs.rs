@@ -3,9 +3,9 @@
 use crate::failure::Failure;
 use crate::folder::ResultFolder;
 use crate::progress;
-use crate::scenario::{Scenario, engineers_words};
+use crate::scenario::{ControllerPlan, Scenario, engineers_words};
 use lpv::certificate::{Claim, Verdict, check};
-use lpv::synthesis::{Design, DesignRequest, SynthesisError, design};
+use lpv::synthesis::{Design, SynthesisError, design_supervised};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -80,10 +80,10 @@ pub fn text(label: &str, verdict: Verdict, claims: &[Claim]) -> String {
 /// Design and check every controller of the scenario, in its order. Controllers that differ only in how they are flown
 /// share one synthesis.
 pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
-    let mut finished: Vec<(DesignRequest, CheckedDesign)> = Vec::new();
-    for controller in &scenario.controllers {
-        let request = &controller.request;
-        let shared = finished.iter().find(|(earlier, _)| same_but_name(earlier, request)).map(|(_, checked)| checked);
+    let mut finished: Vec<(&ControllerPlan, CheckedDesign)> = Vec::new();
+    for plan in &scenario.controllers {
+        let request = &plan.request;
+        let shared = finished.iter().find(|(earlier, _)| same_but_name(earlier, plan)).map(|(_, checked)| checked);
         let checked = match shared {
             Some(earlier) => CheckedDesign {
                 design: Design { name: request.name.clone(), ..earlier.design.clone() },
@@ -91,24 +91,30 @@ pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
                 design_seconds: 0.0,
                 check_seconds: 0.0,
             },
-            None => design_one(scenario, request)
+            None => design_one(scenario, plan)
                 .map_err(|source| Failure::Synthesis { controller: request.name.clone(), source })?,
         };
-        finished.push((request.clone(), checked));
+        finished.push((plan, checked));
     }
     Ok(finished.into_iter().map(|(_, checked)| checked).collect())
 }
 
-fn same_but_name(a: &DesignRequest, b: &DesignRequest) -> bool {
+fn same_but_name(a: &ControllerPlan, b: &ControllerPlan) -> bool {
+    let (supervisions, a, b) = (a.supervision == b.supervision, &a.request, &b.request);
     // all requests of a scenario share plant, weights, grid and sample time
-    a.method == b.method && a.schedule == b.schedule && a.limits == b.limits && a.rate_bounded == b.rate_bounded
+    let requests =
+        a.method == b.method && a.schedule == b.schedule && a.limits == b.limits && a.rate_bounded == b.rate_bounded;
+    requests && supervisions
 }
 
-fn design_one(scenario: &Scenario, request: &DesignRequest) -> Result<CheckedDesign, SynthesisError> {
+fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesign, SynthesisError> {
+    let request = &plan.request;
     let grid_points = if scenario.plant.description().scheduling.is_some() { request.grid_points } else { 1 };
     let bar = progress::bar(&format!("design {}", request.name), grid_points);
     let started = Instant::now();
-    let design = design(&scenario.plant_spec, &*scenario.plant, request, &|done| bar.set_position(done as u64))?;
+    let progress = |done| bar.set_position(done as u64);
+    let design =
+        design_supervised(&scenario.plant_spec, &*scenario.plant, request, &plan.supervision, &progress)?;
     let design_seconds = started.elapsed().as_secs_f64();
     bar.set_message(format!("check {}", request.name));
     let started = Instant::now();

@@ -56,7 +56,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
             ("method", design.method == request.method),
             ("weights.q", design.weights.q == request.weights.q),
             ("weights.r", design.weights.r == request.weights.r),
-            ("controller.limits", design.controller.limits == request.limits),
+            ("controller.limits", *design.controller.actuators() == request.limits),
         ];
         if let Some((key, _)) = same.into_iter().find(|(_, same)| !same) {
             return Err(Failure::BadInput {
