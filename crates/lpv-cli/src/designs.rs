@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::folder::ResultFolder;
 use crate::progress;
 use crate::scenario::{ControllerPlan, Scenario, engineers_words};
-use lpv::certificate::{Claim, Verdict, check};
+use lpv::certificate::{Claim, ProofOptions, SupervisedProofs, Verdict, check, prove_supervised};
 use lpv::synthesis::{Design, SynthesisError, design_supervised};
 use serde::Serialize;
 use std::time::Instant;
@@ -15,6 +15,8 @@ pub struct CheckedDesign {
     pub design: Design,
     /// Claims about it that need no flight.
     pub claims: Vec<Claim>,
+    /// What is proved of a supervised design; `None` of others, which `lpv certify` proves.
+    pub proofs: Option<SupervisedProofs>,
     /// Seconds that synthesis took; zero where a design was shared.
     pub design_seconds: f64,
     /// Seconds that the check took.
@@ -88,6 +90,7 @@ pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
             Some(earlier) => CheckedDesign {
                 design: Design { name: request.name.clone(), ..earlier.design.clone() },
                 claims: earlier.claims.clone(),
+                proofs: earlier.proofs.clone(),
                 design_seconds: 0.0,
                 check_seconds: 0.0,
             },
@@ -113,14 +116,37 @@ fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesig
     let bar = progress::bar(&format!("design {}", request.name), grid_points);
     let started = Instant::now();
     let progress = |done| bar.set_position(done as u64);
-    let design =
-        design_supervised(&scenario.plant_spec, &*scenario.plant, request, &plan.supervision, &progress)?;
+    let design = design_supervised(&scenario.plant_spec, &*scenario.plant, request, &plan.supervision, &progress)?;
     let design_seconds = started.elapsed().as_secs_f64();
     bar.set_message(format!("check {}", request.name));
     let started = Instant::now();
-    let claims = check(&design, &*scenario.plant);
+    let mut claims = check(&design, &*scenario.plant);
+    for inner in &design.inner {
+        claims.extend(named_of_inner(inner, check(inner, &*scenario.plant)));
+    }
+    let mut proofs = None;
+    if design.controller.supervisor.is_some() {
+        bar.set_message(format!("prove {}", request.name));
+        match prove_supervised(&design, &*scenario.plant, &ProofOptions::default()) {
+            Ok(found) => {
+                claims.extend(found.claims.clone());
+                proofs = Some(found);
+            }
+            Err(reason) => {
+                claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string()));
+            }
+        }
+    }
     bar.finish_and_clear();
-    Ok(CheckedDesign { design, claims, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
+    Ok(CheckedDesign { design, claims, proofs, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
+}
+
+/// Claims about a member of a family, with its level.
+pub fn named_of_inner(inner: &Design, claims: Vec<Claim>) -> impl Iterator<Item = Claim> {
+    let level = inner.method.gamma().unwrap_or(f64::NAN);
+    claims
+        .into_iter()
+        .map(move |claim| Claim { claim: format!("inner set of level {level}: {}", claim.claim), ..claim })
 }
 
 /// Write the LPV model and the designs on it.

@@ -4,6 +4,7 @@ use crate::designs::CheckedDesign;
 use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::scenario::Scenario;
+use crate::stay::StepStay;
 use lpv::certificate::{Claim, StepBound, Verdict};
 use lpv::estimator::Consistency;
 use lpv::sim::{Outcome, Performance};
@@ -111,6 +112,8 @@ pub struct ControllerRecord<'a> {
     flight_claims: &'a [Claim],
     /// The bound of each step, with the conditions that it does not meet.
     step_bounds: &'a [StepBound],
+    /// How each step of a supervised controller kept to its certified sets.
+    step_stays: &'a [StepStay],
     outcome: &'a Outcome,
     #[serde(flatten)]
     performance: &'a Performance,
@@ -136,6 +139,7 @@ impl<'a> RunRecord<'a> {
                 guaranteed_cost_verdict: bound_verdict(checked, flown),
                 flight_claims: &flown.claims,
                 step_bounds: &flown.bounds,
+                step_stays: &flown.stays,
                 outcome: &flown.flight.outcome,
                 performance: &flown.performance,
                 estimator_consistency: flown.flight.consistency.as_ref(),

@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::record::bound_verdict;
 use crate::scenario::{ControllerPlan, Scenario};
+use crate::stay::StepStay;
 use lpv::certificate::{Claim, StepBound, UnmetCondition, Verdict};
 use lpv::model::BoxWeights;
 use lpv::plant::{Description, Scene};
@@ -241,6 +242,15 @@ fn estimation_errors(description: &Description, shown: &[usize], trajectory: &Tr
 
 /// What the bound of a flight is worth, in a few words: step by step where there are several.
 pub fn bound_note(flown: &Flown) -> String {
+    if flown.bounds.is_empty() && !flown.stays.is_empty() {
+        // below a governor: no bound on the cost, but a certificate of where the error stays
+        let steps = flown.stays.iter().enumerate();
+        let spell = |(k, step): (usize, &StepStay)| match step.verdict {
+            Verdict::Proved => format!("step {} certified (V ≤ {:.2} γ)", k + 1, step.stay.peak_share),
+            _ => format!("step {} not certified (V ≤ {:.2} γ)", k + 1, step.stay.peak_share),
+        };
+        return steps.map(spell).collect::<Vec<_>>().join("; ");
+    }
     let worth = |bound: &StepBound| {
         let unmet: Vec<&str> = (bound.unmet.iter())
             .map(|condition| match condition {

@@ -69,7 +69,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     }
     let place = arguments.output.out.clone().unwrap_or_else(|| scenario.flights_folder());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
-    let flown = flights::fly_all(&scenario, &loaded);
+    let unproved: Vec<_> = loaded.iter().map(|design| (design, None)).collect();
+    let flown = flights::fly_all(&scenario, &unproved);
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {
         folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
     }

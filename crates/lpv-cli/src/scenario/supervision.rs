@@ -34,10 +34,7 @@ pub(super) fn supervision(
     if let (Some(scheduling), None) = (&defaults.description.scheduling, &request.rate_bounded) {
         return door.refuse(
             format!("{key}.{name}"),
-            format!(
-                "needs rate_bound: without it the design is certified for {} at rest only",
-                scheduling.parameter
-            ),
+            format!("needs rate_bound: without it the design is certified for {} at rest only", scheduling.parameter),
         );
     }
     let mut inner_levels = Vec::new();

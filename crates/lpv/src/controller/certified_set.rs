@@ -101,7 +101,8 @@ mod tests {
 
     #[test]
     fn what_is_not_definite_holds_nothing() {
-        let set = CertifiedSet { level: 1.0, y: MatrixFunction::constant(from_rows(&[vec![1.0, 2.0], vec![2.0, 1.0]])) };
+        let set =
+            CertifiedSet { level: 1.0, y: MatrixFunction::constant(from_rows(&[vec![1.0, 2.0], vec![2.0, 1.0]])) };
         let mut evaluator = SetEvaluator::new(2);
         assert!(!evaluator.at(&set, 0.0));
         assert_eq!(evaluator.value(&[0.1, 0.0]), f64::INFINITY);

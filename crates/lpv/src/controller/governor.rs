@@ -90,6 +90,14 @@ pub(super) struct GovernorState {
 }
 
 impl Governor {
+    /// The profile of the move `delta` of the set-point states along `motion`, for the plant's scheduling state.
+    pub fn profile(&self, motion: &Motion, delta: &[f64], scheduling_state: Option<usize>) -> Profile {
+        let moved = self.set_point_states.iter().zip(delta);
+        let of_parameter =
+            moved.filter(|&(&state, _)| scheduling_state == Some(state)).map(|(_, delta)| delta.abs()).sum::<f64>();
+        motion.profile(delta, self.parameter_rate.map_or(f64::INFINITY, |rate| rate / of_parameter))
+    }
+
     /// The reference where the plant is: the set-point states of `x`, the others at rest.
     pub(super) fn start(&self, x: &[f64], inputs: usize) -> GovernorState {
         let mut rest = self.operating_state.clone();
@@ -199,17 +207,14 @@ impl GovernorState {
             self.moving = None;
         }
         if self.moving.is_none() && self.ready {
-            let mut speed = f64::INFINITY;
             let targets = self.target.iter_mut().zip(&mut self.delta);
             for (&state, (target, delta)) in governor.set_point_states.iter().zip(targets) {
                 *target = sample.set_point[state];
                 *delta = sample.difference(state, sample.set_point[state], self.rest[state]);
-                if let (true, Some(rate)) = (sample.scheduling_state == Some(state), governor.parameter_rate) {
-                    speed = rate / delta.abs();
-                }
             }
             if self.delta.iter().any(|&delta| delta != 0.0) {
-                self.moving = Some((sample.time_s, motion.profile(&self.delta, speed)));
+                let profile = governor.profile(motion, &self.delta, sample.scheduling_state);
+                self.moving = Some((sample.time_s, profile));
             }
         }
         self.reference.copy_from_slice(&self.rest);

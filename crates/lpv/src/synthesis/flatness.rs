@@ -89,10 +89,8 @@ struct Chains {
 fn chains(model: &FrozenModel, states: &[usize]) -> Result<Chains, SupervisionError> {
     let (n, m, d) = (model.a.nrows(), model.b.ncols(), states.len());
     let both = Mat::from_fn(n, n + m, |i, j| if j < n { model.a[(i, j)] } else { model.b[(i, j - n)] });
-    let mut found = Chains {
-        states: vec![Mat::from_fn(n, d, |i, j| if i == states[j] { 1.0 } else { 0.0 })],
-        inputs: Vec::new(),
-    };
+    let mut found =
+        Chains { states: vec![Mat::from_fn(n, d, |i, j| if i == states[j] { 1.0 } else { 0.0 })], inputs: Vec::new() };
     // the columns that have not ended yet
     let mut open: Vec<usize> = (0..d).collect();
     while !open.is_empty() {

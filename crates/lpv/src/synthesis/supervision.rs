@@ -62,7 +62,8 @@ impl GovernorOptions {
     pub fn feedback_limits(&self, actuators: &InputLimits, operating_input: &[f64]) -> InputLimits {
         let left = 1.0 - self.feedforward.unwrap_or(0.0);
         let shrink = |limits: &[Option<f64>]| {
-            let one = |(limit, operating): (&Option<f64>, &f64)| limit.map(|limit| operating + left * (limit - operating));
+            let one =
+                |(limit, operating): (&Option<f64>, &f64)| limit.map(|limit| operating + left * (limit - operating));
             limits.iter().zip(operating_input).map(one).collect()
         };
         match self.feedforward {
@@ -93,7 +94,9 @@ impl Design {
         let level = self.method.gamma().ok_or(SupervisionError::NoCertifiedSet)?;
         let y = match (&self.rate_bounded, self.controller.scheduling_state) {
             (Some(bounded), _) => bounded.y.clone(),
-            (None, None) => inverse_spd(&self.points[0].p).map(MatrixFunction::constant).ok_or(SupervisionError::Frozen)?,
+            (None, None) => {
+                inverse_spd(&self.points[0].p).map(MatrixFunction::constant).ok_or(SupervisionError::Frozen)?
+            }
             (None, Some(_)) => return Err(SupervisionError::Frozen),
         };
         Ok(CertifiedSet { level, y })
@@ -132,9 +135,8 @@ pub fn design_supervised(
         design(spec, plant, &DesignRequest { name, method, ..outer_request.clone() }, progress)
     });
     outer.inner = inner.collect::<Result<_, _>>()?;
-    let member = |design: &Design| {
-        Ok(Member { schedule: design.controller.schedule.clone(), set: design.certified_set()? })
-    };
+    let member =
+        |design: &Design| Ok(Member { schedule: design.controller.schedule.clone(), set: design.certified_set()? });
     let inner = outer.inner.iter().map(member).collect::<Result<_, SupervisionError>>()?;
     outer.controller.supervisor = Some(Supervisor { set, inner, governor });
     Ok(outer)
