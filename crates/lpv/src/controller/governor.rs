@@ -46,6 +46,7 @@
 //! [`REFERENCE_SHARE_OF_RATE`] of r; the rest is left to the error. Starting from e = 0 the error of the LPV model stays zero, and
 //! the rate is that of the reference.
 
+use super::InputLimits;
 use super::certified_set::{CertifiedSet, SetEvaluator};
 use super::motion::Motion;
 use super::profile::Profile;
@@ -53,6 +54,9 @@ use serde::{Deserialize, Serialize};
 
 /// The share of the certified parameter rate that the reference may use.
 pub const REFERENCE_SHARE_OF_RATE: f64 = 0.8;
+
+/// Relative distance to a set point that counts as none.
+const ARRIVED: f64 = 1e-12;
 
 /// A reference governor, as plain data.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -74,9 +78,8 @@ pub struct Governor {
 pub(super) struct GovernorState {
     /// Where the reference rests, or started from.
     rest: Vec<f64>,
-    /// Displacement of the set-point states in the present motion, and where it ends.
+    /// Displacement of the set-point states in the present motion.
     delta: Vec<f64>,
-    target: Vec<f64>,
     /// Start of the present motion, and its profile.
     moving: Option<(f64, Profile)>,
     /// The next sample may start a motion.
@@ -90,6 +93,18 @@ pub(super) struct GovernorState {
 }
 
 impl Governor {
+    /// Whether feedback and reference together stay within the actuators: |u_ref,i| + σᵢ of the feedback's `limits` is at most σᵢ of
+    /// the actuators around `operating_input`. Always so for static references.
+    pub fn authority_is_divided(&self, limits: &InputLimits, operating_input: &[f64]) -> bool {
+        let Some(motion) = &self.motion else { return true };
+        let bounds = limits.symmetric_bound(operating_input).zip(motion.actuators.symmetric_bound(operating_input));
+        bounds.is_some_and(|(feedback, all)| {
+            motion.input_budget.len() == all.len()
+                && (0..all.len())
+                    .all(|i| motion.input_budget[i] >= 0.0 && motion.input_budget[i] + feedback[i] <= all[i])
+        })
+    }
+
     /// The profile of the move `delta` of the set-point states along `motion`, for the plant's scheduling state.
     pub fn profile(&self, motion: &Motion, delta: &[f64], scheduling_state: Option<usize>) -> Profile {
         let moved = self.set_point_states.iter().zip(delta);
@@ -109,7 +124,6 @@ impl Governor {
             reference: rest.clone(),
             rest,
             delta: vec![0.0; d],
-            target: vec![0.0; d],
             moving: None,
             ready: true,
             feedforward: vec![0.0; inputs],
@@ -201,16 +215,19 @@ impl GovernorState {
         if let Some((start_s, profile)) = self.moving
             && sample.time_s - start_s >= profile.duration()
         {
-            for (&state, target) in governor.set_point_states.iter().zip(&self.target) {
-                self.rest[state] = *target;
+            for (&state, delta) in governor.set_point_states.iter().zip(&self.delta) {
+                self.rest[state] += delta;
             }
             self.moving = None;
         }
         if self.moving.is_none() && self.ready {
-            let targets = self.target.iter_mut().zip(&mut self.delta);
-            for (&state, (target, delta)) in governor.set_point_states.iter().zip(targets) {
-                *target = sample.set_point[state];
-                *delta = sample.difference(state, sample.set_point[state], self.rest[state]);
+            for (&state, delta) in governor.set_point_states.iter().zip(&mut self.delta) {
+                let target = sample.set_point[state];
+                *delta = sample.difference(state, target, self.rest[state]);
+                // what rounding leaves of a move that has ended is no move
+                if delta.abs() <= ARRIVED * (1.0 + target.abs()) {
+                    *delta = 0.0;
+                }
             }
             if self.delta.iter().any(|&delta| delta != 0.0) {
                 let profile = governor.profile(motion, &self.delta, sample.scheduling_state);

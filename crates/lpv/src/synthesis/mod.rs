@@ -30,6 +30,7 @@ mod rate_bounded;
 mod region;
 mod slpvqr;
 mod supervision;
+mod supervision_validation;
 mod validation;
 
 pub use design::{CostWeights, Design, DesignRequest, FrozenDesign, Method, ScheduleKind, design};

@@ -11,6 +11,9 @@ use crate::math::matrix::inverse_spd;
 use crate::model::MatrixFunction;
 use crate::plant::{Plant, PlantSpec};
 
+/// What the shares of feedback and reference leave to rounding.
+const ROUNDING: f64 = 1e-12;
+
 /// What a supervised controller is asked for beyond its design.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Supervision {
@@ -165,7 +168,7 @@ pub fn governor(
         Some(share) => {
             let mut motion = motion(plant, &states, rate)?;
             let sigma = actuators.symmetric_bound(&operating.input).ok_or(SupervisionError::NoCertifiedSet)?;
-            motion.input_budget = sigma.iter().map(|sigma| share * sigma).collect();
+            motion.input_budget = sigma.iter().map(|sigma| share * sigma * (1.0 - ROUNDING)).collect();
             motion.state_bounds.clone_from(&options.state_bounds);
             motion.actuators = actuators.clone();
             Some(motion)

@@ -146,6 +146,12 @@ pub(in super::super) fn prove_motion(
     proof.claim.margin = proof.absorbed - disturbance;
     proof.claim.detail =
         format!("residual at most {disturbance:.1e}, the sets absorb {:.1e}; {count} cells", proof.absorbed);
+    let divided =
+        |design: &Design| governor.authority_is_divided(&design.controller.limits, &design.controller.operating_input);
+    if !members.iter().all(|(design, _)| divided(design)) {
+        proof.claim.verdict = Verdict::Undecided;
+        proof.claim.detail = "the reference's input and the feedback's limits together exceed the actuators".into();
+    }
     proof.claim.seconds = started.elapsed().as_secs_f64();
     proof
 }
