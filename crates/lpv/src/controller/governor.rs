@@ -244,6 +244,9 @@ impl GovernorState {
         for (state, deviation) in self.error.iter_mut().enumerate() {
             *deviation = sample.x[state] - governor.operating_state[state];
         }
-        motion.add_to(sample.rho, &self.delta, &s, &self.error, &mut self.reference, &mut self.feedforward);
+        motion.add_states(sample.rho, &self.delta, &s, &mut self.reference);
+        // the input is held until the next sample: its value in the middle is nearest to all it stands for
+        let s = profile.at(sample.time_s + 0.5 * sample.sample_time_s - start_s);
+        motion.add_inputs(sample.rho, &self.delta, &s, &self.error, &mut self.feedforward);
     }
 }

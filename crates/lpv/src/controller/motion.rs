@@ -100,20 +100,22 @@ impl Motion {
         fastest.slower(high)
     }
 
-    /// Add Σ_{k≥1} s⁽ᵏ⁾ Z_kΔ to `reference`, and write u_ref for the error-free rate at state deviation `x`.
-    pub(super) fn add_to(
+    /// Add Σ_{k≥1} s⁽ᵏ⁾ Z_kΔ to `reference`.
+    pub(super) fn add_states(&self, rho: f64, delta: &[f64], s: &[f64; MOST_ORDER + 1], reference: &mut [f64]) {
+        for (function, s) in self.states.iter().zip(&s[1..]) {
+            function.add_product(rho, delta, *s, reference);
+        }
+    }
+
+    /// Add u_ref to `input`, with ρ̇ from the deviation x − x*.
+    pub(super) fn add_inputs(
         &self,
         rho: f64,
         delta: &[f64],
         s: &[f64; MOST_ORDER + 1],
         deviation: &[f64],
-        reference: &mut [f64],
         input: &mut [f64],
     ) {
-        for (function, s) in self.states.iter().zip(&s[1..]) {
-            function.add_product(rho, delta, *s, reference);
-        }
-        input.fill(0.0);
         for (function, s) in self.inputs.iter().zip(&s[1..]) {
             function.add_product(rho, delta, *s, input);
         }
