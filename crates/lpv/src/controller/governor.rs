@@ -196,7 +196,7 @@ impl GovernorState {
             // outside the level: to where V is least, which never makes it worse
             let root = if v <= level { (slope * slope + square * (level - v)).sqrt() } else { 0.0 };
             let lambda = ((slope + root) / square).min(most);
-            if !(lambda > 0.0) {
+            if lambda.is_nan() || lambda <= 0.0 {
                 continue;
             }
             for &state in &governor.set_point_states {

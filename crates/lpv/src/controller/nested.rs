@@ -65,14 +65,14 @@ pub(super) fn select(
     };
     let mut member = active;
     let mut v = value(member);
-    if !(v <= sets[member].level) {
+    if v > sets[member].level {
         let holds = (0..sets.len()).rev().map(|i| (i, value(i))).find(|&(i, v)| v <= sets[i].level);
         (member, v) = holds.unwrap_or_else(|| (0, value(0)));
     }
     if v <= sets[member].level {
-        for inner in member + 1..sets.len() {
+        for (inner, set) in sets.iter().enumerate().skip(member + 1) {
             let v_inner = value(inner);
-            if v_inner <= ENTER * sets[inner].level && v_inner <= v {
+            if v_inner <= ENTER * set.level && v_inner <= v {
                 (member, v) = (inner, v_inner);
             }
         }

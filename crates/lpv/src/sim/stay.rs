@@ -48,14 +48,14 @@ pub fn set_stay(
         if found > stay.peak_share || found.is_nan() {
             (stay.peak_share, stay.peak_share_time_s) = (found, time_s);
         }
-        if !(found <= 1.0) {
+        if found.is_nan() || found > 1.0 {
             stay.outside_from_s.get_or_insert(time_s);
             stay.outside_s += duration_s;
         }
         let (Some(state), Some(next)) = (parameter, trajectory.states.get(k + 1)) else { continue };
         let rate = (next[state] - trajectory.states[k][state]).abs() / duration_s;
         stay.peak_rate = stay.peak_rate.max(rate);
-        if !(rate <= allowed) {
+        if rate.is_nan() || rate > allowed {
             stay.fast_from_s.get_or_insert(time_s);
             stay.fast_s += duration_s;
         }

@@ -133,7 +133,7 @@ impl Design {
             let found = format!("is {}", motion.parameter_rate);
             return refuse(key("parameter_rate"), found, format!("from 0 to the certified rate {rate}"));
         }
-        if motion.state_bounds.iter().flatten().any(|bound| !(*bound > 0.0)) {
+        if motion.state_bounds.iter().flatten().any(|&bound| bound.is_nan() || bound <= 0.0) {
             return refuse(key("state_bounds"), "has an entry that is not positive", "positive or null");
         }
         match governor.authority_is_divided(&self.controller.limits, &self.controller.operating_input) {
