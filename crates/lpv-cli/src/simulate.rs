@@ -57,6 +57,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
             ("weights.q", design.weights.q == request.weights.q),
             ("weights.r", design.weights.r == request.weights.r),
             ("controller.limits", *design.controller.actuators() == request.limits),
+            ("controller.supervisor", design.is_supervised_as(&plan.supervision, &request.limits)),
         ];
         if let Some((key, _)) = same.into_iter().find(|(_, same)| !same) {
             return Err(Failure::BadInput {

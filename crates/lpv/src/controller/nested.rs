@@ -79,3 +79,41 @@ pub(super) fn select(
     }
     Active { member, share: v / sets[member].level }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::matrix::diagonal;
+    use crate::model::MatrixFunction;
+
+    /// {x² / y ≤ γ} for a scalar error.
+    fn set(y: f64, level: f64) -> CertifiedSet {
+        CertifiedSet { level, y: MatrixFunction::constant(diagonal(&[y])) }
+    }
+
+    #[test]
+    fn the_smallest_set_that_holds_the_error_is_active() {
+        // |x| ≤ 10, 3, 1, with V falling from member to member
+        let sets = [set(1.0, 100.0), set(3.0, 3.0), set(5.0, 0.2)];
+        let sets: Vec<&CertifiedSet> = sets.iter().collect();
+        let mut evaluator = SetEvaluator::new(1);
+        let mut at = |active: usize, x: f64| select(active, &sets, &mut evaluator, 0.0, &[x]);
+        assert_eq!(at(0, 9.0), Active { member: 0, share: 0.81 });
+        assert_eq!(at(0, 2.99).member, 0, "inside the second, but not by the margin");
+        assert_eq!(at(0, 2.8).member, 1);
+        assert_eq!(at(1, 2.99).member, 1, "and it stays there");
+        assert_eq!(at(0, 0.5).member, 2, "inwards over several at once");
+        // out: what has left its set goes to the smallest that holds it
+        assert_eq!(at(2, 2.0).member, 1);
+        assert_eq!(at(2, 5.0).member, 0);
+        assert_eq!(at(2, 20.0), Active { member: 0, share: 4.0 });
+    }
+
+    #[test]
+    fn a_larger_bound_is_not_taken() {
+        // the inner V is larger: handing over would cost more than the active member guarantees
+        let sets = [set(2.0, 50.0), set(1.0, 1.0)];
+        let sets: Vec<&CertifiedSet> = sets.iter().collect();
+        assert_eq!(select(0, &sets, &mut SetEvaluator::new(1), 0.0, &[0.5]).member, 0);
+    }
+}

@@ -104,6 +104,29 @@ impl Design {
         };
         Ok(CertifiedSet { level, y })
     }
+
+    /// Whether its controller is supervised as `supervision` asks, on actuators with limits `actuators`.
+    pub fn is_supervised_as(&self, supervision: &Supervision, actuators: &InputLimits) -> bool {
+        let mut levels = supervision.inner_levels.clone();
+        levels.sort_by(|a, b| b.total_cmp(a));
+        let found_levels: Vec<f64> = self.inner.iter().filter_map(|inner| inner.method.gamma()).collect();
+        let limits = supervision.feedback_limits(actuators, &self.controller.operating_input);
+        let found = self.controller.supervisor.as_ref().and_then(|supervisor| supervisor.governor.as_ref());
+        let same_governor = match (found, &supervision.governor) {
+            (None, None) => true,
+            (Some(found), Some(options)) => {
+                let same_motion = match (&found.motion, options.feedforward) {
+                    (None, None) => true,
+                    (Some(motion), Some(_)) => motion.state_bounds == options.state_bounds,
+                    _ => false,
+                };
+                found.level_share == options.level_share && same_motion
+            }
+            _ => false,
+        };
+        let same_actuators = self.controller.actuators() == actuators && self.controller.limits == limits;
+        found_levels == levels && same_governor && same_actuators
+    }
 }
 
 /// Design `request`, and around it what `supervision` asks for; `request.limits` are the actuators'.
