@@ -206,8 +206,8 @@ pub fn governor(
     })
 }
 
-/// The states that a governor of a design for parameter rates up to `rate` can move: [`set_point_states`], without the
-/// scheduling state where it is certified at rest only.
+/// The states that a governor of a design for parameter rates up to `rate` can move: those in whose directions the plant
+/// rests anywhere, A(ρ)eⱼ = 0 for every ρ, without the scheduling state where it is certified at rest only.
 pub fn governed_states(plant: &dyn Plant, rate: f64) -> Vec<usize> {
     let scheduling_state = plant.description().scheduling.as_ref().map(|scheduling| scheduling.state);
     let mut states = set_point_states(plant);
