@@ -13,6 +13,8 @@
 
 /// Derivatives that can be bounded, at most.
 pub const MOST_ORDER: usize = 4;
+/// What is smaller than this, against its peak, is rounding.
+const ROUNDING: f64 = 1e-12;
 /// No box is shorter than this where nothing bounds it.
 const SHORTEST_S: f64 = 1e-9;
 /// Halvings of a bracket when a box length is sought.
@@ -62,6 +64,9 @@ impl Profile {
     }
 
     /// [s, s′, s″, s‴, s⁗] at time `t` after its start.
+    ///
+    /// s⁽ᴺ⁾ is constant between the 2ᴺ times Σ_{j∈S} Tⱼ; from one to the next the derivatives are carried by Taylor's formula. The
+    /// sum of truncated powers is the same polynomial, but loses all digits where one box is much longer than the others.
     pub fn at(&self, t: f64) -> [f64; MOST_ORDER + 1] {
         let mut values = [0.0; MOST_ORDER + 1];
         if t >= self.duration() {
@@ -69,25 +74,44 @@ impl Profile {
             return values;
         }
         let boxes = &self.boxes[..self.order];
-        let area: f64 = boxes.iter().product();
-        for subset in 0..1usize << self.order {
-            let (mut start, mut sign) = (0.0, 1.0 / area);
-            for (_, length) in boxes.iter().enumerate().filter(|(j, _)| subset >> j & 1 == 1) {
-                start += length;
-                sign = -sign;
-            }
-            let since = t - start;
-            if since < 0.0 {
-                continue;
-            }
-            // (t − T_S)^j / j!, from j = 0 up, is the derivative N − j
-            let mut power = sign;
-            for j in 0..=self.order {
-                values[self.order - j] += power;
-                power *= since / (j + 1) as f64;
+        let mut jumps = [(f64::INFINITY, 0.0); 1 << MOST_ORDER];
+        for (subset, jump) in jumps.iter_mut().enumerate().take(1 << self.order) {
+            let area: f64 = boxes.iter().product();
+            *jump = (0.0, 1.0 / area);
+            for (j, length) in boxes.iter().enumerate() {
+                if subset >> j & 1 == 1 {
+                    *jump = (jump.0 + length, -jump.1);
+                }
             }
         }
+        jumps.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let peaks = self.peaks();
+        let mut now = 0.0;
+        for (time, jump) in jumps.into_iter().take_while(|&(time, _)| time <= t) {
+            self.advance(&mut values, time - now);
+            // a rounding error where a derivative should be zero would be carried along for the whole cruise
+            for (value, peak) in values[1..].iter_mut().zip(&peaks) {
+                *value = if value.abs() < ROUNDING * peak { 0.0 } else { *value };
+            }
+            values[self.order] += jump;
+            now = time;
+        }
+        if t > now {
+            self.advance(&mut values, t - now);
+        }
         values
+    }
+
+    /// s⁽ᵏ⁾(t + h) = Σ_j s⁽ᵏ⁺ʲ⁾(t) hʲ/j!, where s⁽ᴺ⁾ is constant.
+    fn advance(&self, values: &mut [f64; MOST_ORDER + 1], h: f64) {
+        for k in 0..self.order {
+            let (mut sum, mut factor) = (0.0, 1.0);
+            for (j, value) in values[k..=self.order].iter().enumerate() {
+                sum += factor * value;
+                factor *= h / (j + 1) as f64;
+            }
+            values[k] = sum;
+        }
     }
 }
 
@@ -172,6 +196,18 @@ mod tests {
         }
         assert_eq!(profile.at(-1.0), [0.0; 5]);
         assert_eq!(profile.at(profile.duration()), [1.0, 0.0, 0.0, 0.0, 0.0]);
+    }
+
+    /// Long cruises lose no digits: at a speed of 10⁻⁴ the middle is the middle, and the end is met.
+    #[test]
+    fn slow_profiles_are_exact() {
+        let profile = Profile::fastest([1e-4, f64::INFINITY, f64::INFINITY, 100.0]);
+        let duration = profile.duration();
+        assert!(duration > 1e4);
+        let middle = profile.at(0.5 * duration);
+        assert!((middle[0] - 0.5).abs() < 1e-13 && (middle[1] - 1e-4).abs() < 1e-17, "{middle:?}");
+        let end = profile.at(duration * (1.0 - 1e-12));
+        assert!((end[0] - 1.0).abs() < 1e-12, "{end:?}");
     }
 
     /// Minimum times in closed form: 2/√b₂ for bounded acceleration, and (32/b₃)^⅓ for bounded jerk.
