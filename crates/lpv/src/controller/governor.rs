@@ -125,7 +125,7 @@ impl Governor {
             rest,
             delta: vec![0.0; d],
             moving: None,
-            ready: true,
+            ready: false,
             feedforward: vec![0.0; inputs],
             direction: vec![0.0; n],
             error: vec![0.0; n],

@@ -150,6 +150,52 @@ fn the_lpv_model_follows_the_reference_exactly() {
     assert!(most > 0.85 * tilt, "{most}");
 }
 
+/// Whatever the move, the yaw and its rate: the reference's input keeps to its share, its tilt to its bound, its yaw to its rate,
+/// and one of them is nearly used up.
+#[test]
+fn references_keep_to_their_bounds() {
+    let governor = GOVERNED.controller.supervisor.as_ref().unwrap().governor.as_ref().unwrap();
+    let motion = governor.motion.as_ref().unwrap();
+    assert_eq!(governor.set_point_states, [3, 4, 5, 11]);
+    let mut next = numbers(3);
+    for case in 0..60 {
+        let scale = 10f64.powf(3.0 * next());
+        let mut delta: Vec<f64> = (0..4).map(|_| scale * next()).collect();
+        delta[3] = if case % 3 == 0 { 0.0 } else { 3.0 * next() };
+        let profile = governor.profile(motion, &delta, Some(11));
+        let mut used = 0.0f64;
+        for k in 0..400 {
+            let s = profile.at(profile.duration() * f64::from(k) / 400.0);
+            let (rho, rate) = (3.2 * next(), if k % 2 == 0 { RATE } else { -RATE });
+            let (mut input, mut state) = ([0.0; 4], [0.0; 12]);
+            for (i, function) in motion.inputs.iter().enumerate() {
+                function.add_product(rho, &delta, s[i + 1], &mut input);
+            }
+            for (i, function) in motion.inputs_by_rate.iter().enumerate() {
+                function.add_product(rho, &delta, rate * s[i + 1], &mut input);
+            }
+            for (i, function) in motion.states.iter().enumerate() {
+                function.add_product(rho, &delta, s[i + 1], &mut state);
+            }
+            let budget = 0.5 * 9.807 / 2.0;
+            let shares = input.map(|u| u.abs() / budget);
+            let of_rate = (delta[3] * s[1]).abs() / (0.8 * RATE);
+            let of_tilt = state[9].abs().max(state[10].abs()) / 20f64.to_radians();
+            used = shares.into_iter().fold(of_rate.max(of_tilt), f64::max).max(used);
+        }
+        assert!(used <= 1.0 + 1e-9, "case {case}: {used} of what is allowed");
+        assert!(used > 0.3, "case {case}: only {used} of what is allowed");
+    }
+}
+
+/// Numbers in [−1, 1).
+fn numbers(mut seed: u64) -> impl FnMut() -> f64 {
+    move || {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}
+
 /// From the edge of the certified set, with a move at once: V never passes γ on the LPV model as long as the yaw keeps to
 /// the rate, whatever the reference does.
 #[test]
@@ -157,11 +203,7 @@ fn the_set_is_invariant_while_the_reference_moves() {
     let model = LpvQuadrotor(Quadrotor::new(QuadrotorParameters::default()));
     let set = &GOVERNED.controller.supervisor.as_ref().unwrap().set;
     let mut evaluator = SetEvaluator::new(12);
-    let mut seed = 7u64;
-    let mut next = || {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
+    let mut next = numbers(7);
     let mut checked = 0;
     for _ in 0..24 {
         // velocities, rates and tilts off rest; positions and yaw are where the reference starts
