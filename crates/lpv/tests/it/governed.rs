@@ -5,7 +5,7 @@ use crate::quadrotor::{limits, plant, spec, weights};
 use lpv::controller::{InputLimits, SetEvaluator};
 use lpv::math::matrix::{diagonal, identity, quadratic_form};
 use lpv::math::scalar::Scalar;
-use lpv::plant::{Description, Equations, Plant, PlantSpec, Quadrotor, QuadrotorParameters};
+use lpv::plant::{Description, Equations, LinearParameters, Plant, PlantSpec, Quadrotor, QuadrotorParameters};
 use lpv::sim::{Flight, Outcome, Performance, Reference, SetPoint, Simulation, performance};
 use lpv::synthesis::{
     CostWeights, Design, DesignRequest, GovernorOptions, HighGainOptions, Method, RateBoundedOptions, Supervision,
@@ -265,6 +265,40 @@ fn cart(supervision: &Supervision, gamma: f64) -> Result<Design, SynthesisError>
         rate_bounded: None,
     };
     design_supervised(&spec, &*spec.build().unwrap(), &request, supervision, &|_| {})
+}
+
+/// Motions are found for any plant: a mass with friction, whose steady speed takes a force, and a second actuator behind a lag
+/// that it does not need. Without a parameter nothing is interpolated, and everything is proved too.
+#[test]
+fn motions_of_a_linear_plant_are_found_and_proved() {
+    use lpv::certificate::{ProofOptions, Verdict, prove_supervised};
+    let a = vec![vec![0.0, 1.0, 0.0], vec![0.0, -0.5, 1.0], vec![0.0, 0.0, -2.0]];
+    let b = vec![vec![0.0, 0.0], vec![1.0, 0.0], vec![0.0, 2.0]];
+    let spec = PlantSpec::Linear(LinearParameters { a, b, c: None });
+    let plant = spec.build().unwrap();
+    let weights = CostWeights { q: identity(3), r: diagonal(&[0.1, 0.1]) };
+    let request = DesignRequest {
+        name: "mass".into(),
+        method: Method::Slpvqr { gamma: 1.0 },
+        weights: weights.clone(),
+        grid_points: 1,
+        schedule: Default::default(),
+        limits: InputLimits { min: vec![Some(-1.0); 2], max: vec![Some(1.0); 2] },
+        sample_time_s: 0.001,
+        rate_bounded: None,
+    };
+    let state_bounds = vec![None, Some(0.7), None];
+    let governor = Some(GovernorOptions { level_share: 0.9, feedforward: Some(0.6), state_bounds });
+    let supervision = Supervision { inner_levels: vec![0.3], governor };
+    let design = design_supervised(&spec, &*plant, &request, &supervision, &|_| {}).unwrap();
+    design.validate().unwrap();
+    let proofs = prove_supervised(&design, &*plant, &ProofOptions::default()).unwrap();
+    assert_eq!(proofs.verdict(), Verdict::Proved, "{:?}", proofs.claims);
+    let (flight, found) = fly(&*plant, &design, &weights, vec![0.0; 3], vec![(0.0, vec![(0, 12.0)])], 40.0);
+    assert!(found.settling_time_s.is_some_and(|time| time < 21.0), "{:?}", found.settling_time_s);
+    assert!(peak_share(&flight) < 1e-4, "V/γ reaches {}", peak_share(&flight));
+    let fastest = flight.trajectory.states.iter().map(|x| x[1].abs()).fold(0.0, f64::max);
+    assert!(fastest <= 0.7 * (1.0 + 1e-6), "{fastest}");
 }
 
 /// A static governor keeps V at its share of the level, uses it up, and arrives.
