@@ -97,6 +97,10 @@ export interface Run {
   weights: Series[];
   /** Cost accumulated so far. */
   cost: Series;
+  /** Per state: the reference that a governor made of the set point, or null where it is of no interest; null without a governor. */
+  governed: (Series | null)[] | null;
+  /** V/γ of the error in the certified set that held it, or null for a controller that does not watch one. */
+  set_share: Series | null;
   /** [output][sample], with noise, or null when the state is known. */
   measurement: Series[] | null;
   estimation: Estimation | null;
@@ -262,6 +266,12 @@ function checkRun(check: Checker, value: unknown, path: string, size: Sizes): vo
   check.table(run.inputs, `${path}.inputs`, size.inputs, size.samples);
   check.table(run.weights, `${path}.weights`, size.weights, size.samples);
   check.series(run.cost, `${path}.cost`, size.samples);
+  if (run.governed !== null) {
+    check.list(run.governed, `${path}.governed`, size.states).forEach((row, i) => {
+      if (row !== null) check.series(row, `${path}.governed[${i}]`, size.samples);
+    });
+  }
+  if (run.set_share !== null) check.series(run.set_share, `${path}.set_share`, size.samples);
   if (run.measurement !== null) check.table(run.measurement, `${path}.measurement`, size.outputs, size.samples);
   if (run.estimation !== null) {
     const estimation = check.dict(run.estimation, `${path}.estimation`);

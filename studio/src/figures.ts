@@ -26,6 +26,7 @@ function statePlot(report: Report, state: number): PlotSpec {
   const reference = report.reference[state];
   return plot(`state-${state}`, channel, [
     ...(reference ? [curve(null, "reference", reference, channel.unit)] : []),
+    ...report.runs.flatMap((run) => (run.governed?.[state] ? [curve(run, "governed", run.governed[state], channel.unit)] : [])),
     ...report.runs.map((run) => curve(run, "line", run.states[state], channel.unit)),
   ]);
 }
@@ -51,7 +52,7 @@ export function responses(report: Report): PlotGroup {
   return {
     id: "responses",
     title: report.plant.scene ? "Position and attitude" : "Responses",
-    caption: `Grey: set point.${states.some((i) => isFullTurnOff(report, i)) ? " Angles a full turn apart are the same attitude." : ""}`,
+    caption: `Grey: set point.${report.runs.some((run) => run.governed) ? " Dotted: reference that a governor makes of it." : ""}${states.some((i) => isFullTurnOff(report, i)) ? " Angles a full turn apart are the same attitude." : ""}`,
     rows: Math.ceil(states.length / 2),
     plots: states.map((i) => statePlot(report, i)),
   };
@@ -90,6 +91,22 @@ export function cost(report: Report): PlotGroup {
     caption: "What each run has cost so far.",
     rows: 1,
     plots: [plot("cost", { name: "J", unit: "" }, report.runs.map((run) => curve(run, "line", run.cost, "")))],
+  };
+}
+
+/** How far into its certified set the error of each run goes. */
+export function certifiedSet(report: Report): PlotGroup | null {
+  const runs = report.runs.filter((run) => run.set_share !== null);
+  if (runs.length === 0) return null;
+  const limits = runs.map((run) => ({ run, min: null, max: 1 }));
+  const curves = runs.map((run) => curve(run, "line", run.set_share!, ""));
+  const title = el("span", {}, el("i", {}, "V"), "/", el("i", {}, "γ"));
+  return {
+    id: "certified-set",
+    title: "Certified set",
+    caption: "Level of the error in the set that holds it: below 1 is inside.",
+    rows: 1,
+    plots: [plot("set-share", { name: "V/γ", unit: "" }, curves, { title, name: "V/γ", limits })],
   };
 }
 

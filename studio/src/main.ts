@@ -31,7 +31,7 @@ function showPage(app: HTMLElement, report: Report): void {
     "div",
     { class: "plots" },
     plotLegend(report, board, selection, theme, timeline),
-    ...sections([figures.responses(report), figures.inputs(report), figures.cost(report), figures.weights(report), figures.otherStates(report)]),
+    ...sections([figures.responses(report), figures.inputs(report), figures.certifiedSet(report), figures.cost(report), figures.weights(report), figures.otherStates(report)]),
   );
   app.replaceChildren(
     pageHeader(report, theme),

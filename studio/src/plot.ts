@@ -12,7 +12,7 @@ import { verticalRange } from "./range";
 import { lastIndex } from "./samples";
 import { dash } from "./theme";
 
-export type CurveKind = "line" | "reference" | "points" | "sigma";
+export type CurveKind = "line" | "reference" | "governed" | "points" | "sigma";
 
 /** One curve of a plot, in shown units. */
 export interface Curve {
@@ -173,6 +173,8 @@ export class Plot {
     switch (curve.kind) {
       case "reference":
         return { stroke: () => inks().reference, width: 1.5, points: { show: false }, paths: tamePath };
+      case "governed":
+        return { stroke: color, width: 1, dash: [1, 3], points: { show: false }, paths: tamePath };
       case "sigma":
         return { stroke: () => inks().bandEdge, width: 1, points: { show: false } };
       case "points":

@@ -146,6 +146,8 @@ export class PlotBoard {
     switch (curve.kind) {
       case "reference":
         return "ref.";
+      case "governed":
+        return curve.run ? `${this.letter(curve.run)} ref.` : null;
       case "points":
         return "meas.";
       case "sigma":

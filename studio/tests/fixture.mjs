@@ -185,6 +185,8 @@ function makeRun(spec, index, { time, duration_s, steps, estimation }) {
     weights: WEIGHTS.map((w) => at((r) => w(r.x[11]) / 4)),
     cost: at((r) => r.cost),
     measurement: noise > 0 && estimation ? [3, 4, 5, 9, 10, 11].map((i) => at((r) => r.x[i] + (i < 9 ? 0.1 : 0.0873) * gauss())) : null,
+    governed: null,
+    set_share: null,
     estimation: noise > 0 && estimation ? { error, sigma3, inside_share: error.map((e, i) => e.filter((v, k) => Math.abs(v) <= sigma3[i][k]).length / e.length) } : null,
   };
 }

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::output::print;
 use crate::scenario::read_text;
 use clap::Args;
-use lpv::certificate::{BlockMargin, Claim, ProofOptions, Verdict, block_margins, check, prove};
+use lpv::certificate::{BlockMargin, Claim, ProofOptions, Verdict, block_margins, check, prove_supervised};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -56,11 +56,15 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     positive("--rate", arguments.rate, 0.0)?;
     positive("--region", arguments.region, f64::MIN_POSITIVE)?;
     let mut claims = check(&design, &*plant);
+    for inner in &design.inner {
+        claims.extend(designs::named_of_inner(inner, check(inner, &*plant)));
+    }
     let mut verdict = designs::worst(&claims);
-    match prove(&design, &*plant, &ProofOptions { rate: arguments.rate, level: arguments.region }) {
+    match prove_supervised(&design, &*plant, &ProofOptions { rate: arguments.rate, level: arguments.region }) {
         Ok(proofs) => {
             // the rates found for a frozen design are a finding, not a claim that it makes
-            let counted = |claim: &&Claim| proofs.asked || claim.verdict == Verdict::Refuted;
+            let asked = proofs.members[0].asked;
+            let counted = |claim: &&Claim| asked || claim.verdict == Verdict::Refuted;
             verdict = proofs.claims.iter().filter(counted).map(|claim| claim.verdict).fold(verdict, Verdict::min);
             claims.extend(proofs.claims);
         }

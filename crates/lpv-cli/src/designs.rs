@@ -3,9 +3,9 @@
 use crate::failure::Failure;
 use crate::folder::ResultFolder;
 use crate::progress;
-use crate::scenario::{Scenario, engineers_words};
-use lpv::certificate::{Claim, Verdict, check};
-use lpv::synthesis::{Design, DesignRequest, SynthesisError, design};
+use crate::scenario::{ControllerPlan, Scenario, engineers_words};
+use lpv::certificate::{Claim, ProofOptions, SupervisedProofs, Verdict, check, prove_supervised};
+use lpv::synthesis::{Design, SynthesisError, design_supervised};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -15,6 +15,8 @@ pub struct CheckedDesign {
     pub design: Design,
     /// Claims about it that need no flight.
     pub claims: Vec<Claim>,
+    /// What is proved of a supervised design; `None` of others, which `lpv certify` proves.
+    pub proofs: Option<SupervisedProofs>,
     /// Seconds that synthesis took; zero where a design was shared.
     pub design_seconds: f64,
     /// Seconds that the check took.
@@ -80,41 +82,71 @@ pub fn text(label: &str, verdict: Verdict, claims: &[Claim]) -> String {
 /// Design and check every controller of the scenario, in its order. Controllers that differ only in how they are flown
 /// share one synthesis.
 pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
-    let mut finished: Vec<(DesignRequest, CheckedDesign)> = Vec::new();
-    for controller in &scenario.controllers {
-        let request = &controller.request;
-        let shared = finished.iter().find(|(earlier, _)| same_but_name(earlier, request)).map(|(_, checked)| checked);
+    let mut finished: Vec<(&ControllerPlan, CheckedDesign)> = Vec::new();
+    for plan in &scenario.controllers {
+        let request = &plan.request;
+        let shared = finished.iter().find(|(earlier, _)| same_but_name(earlier, plan)).map(|(_, checked)| checked);
         let checked = match shared {
             Some(earlier) => CheckedDesign {
                 design: Design { name: request.name.clone(), ..earlier.design.clone() },
                 claims: earlier.claims.clone(),
+                proofs: earlier.proofs.clone(),
                 design_seconds: 0.0,
                 check_seconds: 0.0,
             },
-            None => design_one(scenario, request)
+            None => design_one(scenario, plan)
                 .map_err(|source| Failure::Synthesis { controller: request.name.clone(), source })?,
         };
-        finished.push((request.clone(), checked));
+        finished.push((plan, checked));
     }
     Ok(finished.into_iter().map(|(_, checked)| checked).collect())
 }
 
-fn same_but_name(a: &DesignRequest, b: &DesignRequest) -> bool {
+fn same_but_name(a: &ControllerPlan, b: &ControllerPlan) -> bool {
+    let (supervisions, a, b) = (a.supervision == b.supervision, &a.request, &b.request);
     // all requests of a scenario share plant, weights, grid and sample time
-    a.method == b.method && a.schedule == b.schedule && a.limits == b.limits && a.rate_bounded == b.rate_bounded
+    let requests =
+        a.method == b.method && a.schedule == b.schedule && a.limits == b.limits && a.rate_bounded == b.rate_bounded;
+    requests && supervisions
 }
 
-fn design_one(scenario: &Scenario, request: &DesignRequest) -> Result<CheckedDesign, SynthesisError> {
+fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesign, SynthesisError> {
+    let request = &plan.request;
     let grid_points = if scenario.plant.description().scheduling.is_some() { request.grid_points } else { 1 };
     let bar = progress::bar(&format!("design {}", request.name), grid_points);
     let started = Instant::now();
-    let design = design(&scenario.plant_spec, &*scenario.plant, request, &|done| bar.set_position(done as u64))?;
+    let progress = |done| bar.set_position(done as u64);
+    let design = design_supervised(&scenario.plant_spec, &*scenario.plant, request, &plan.supervision, &progress)?;
     let design_seconds = started.elapsed().as_secs_f64();
     bar.set_message(format!("check {}", request.name));
     let started = Instant::now();
-    let claims = check(&design, &*scenario.plant);
+    let mut claims = check(&design, &*scenario.plant);
+    for inner in &design.inner {
+        claims.extend(named_of_inner(inner, check(inner, &*scenario.plant)));
+    }
+    let mut proofs = None;
+    if design.controller.supervisor.is_some() {
+        bar.set_message(format!("prove {}", request.name));
+        match prove_supervised(&design, &*scenario.plant, &ProofOptions::default()) {
+            Ok(found) => {
+                claims.extend(found.claims.clone());
+                proofs = Some(found);
+            }
+            Err(reason) => {
+                claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string()));
+            }
+        }
+    }
     bar.finish_and_clear();
-    Ok(CheckedDesign { design, claims, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
+    Ok(CheckedDesign { design, claims, proofs, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
+}
+
+/// Claims about a member of a family, with its level.
+pub fn named_of_inner(inner: &Design, claims: Vec<Claim>) -> impl Iterator<Item = Claim> {
+    let level = inner.method.gamma().unwrap_or(f64::NAN);
+    claims
+        .into_iter()
+        .map(move |claim| Claim { claim: format!("inner set of level {level}: {}", claim.claim), ..claim })
 }
 
 /// Write the LPV model and the designs on it.

@@ -1,7 +1,8 @@
 //! Flights of a scenario: simulation of each controller, and what its design says about each set-point step.
 
 use crate::scenario::{ControllerPlan, Scenario};
-use lpv::certificate::{Claim, StepBound, StepConditions, UnmetCondition, step_bound};
+use crate::stay::{StepStay, step_stays};
+use lpv::certificate::{Claim, StepBound, StepConditions, SupervisedProofs, UnmetCondition, step_bound};
 use lpv::model::linearize;
 use lpv::sim::{Flight, Performance, Simulation, StepResponse, performance};
 use lpv::synthesis::{Design, covering_level};
@@ -14,9 +15,12 @@ pub struct Flown {
     pub flight: Flight,
     /// Its figures of merit.
     pub performance: Performance,
-    /// What the design guarantees for each step that was reached.
+    /// What the design guarantees for each step that was reached; empty below a governor, whose steps have no bound on their
+    /// cost.
     pub bounds: Vec<StepBound>,
-    /// A claim for each of these bounds.
+    /// Whether each step stayed in the certified sets; empty of a controller that does not watch them.
+    pub stays: Vec<StepStay>,
+    /// A claim for each of these.
     pub claims: Vec<Claim>,
     /// Seconds that it took.
     pub seconds: f64,
@@ -30,12 +34,12 @@ impl Flown {
     }
 }
 
-/// Fly every controller with its design, in parallel.
-pub fn fly_all(scenario: &Scenario, designs: &[Design]) -> Vec<Flown> {
+/// Fly every controller with its design, in parallel; with what is proved of supervised ones.
+pub fn fly_all(scenario: &Scenario, designs: &[(&Design, Option<&SupervisedProofs>)]) -> Vec<Flown> {
     let bar = crate::progress::bar("fly", designs.len());
     let flights = (scenario.controllers.par_iter().zip(designs))
-        .map(|(plan, design)| {
-            let flown = fly(scenario, plan, design);
+        .map(|(plan, (design, proofs))| {
+            let flown = fly(scenario, plan, design, *proofs);
             bar.inc(1);
             flown
         })
@@ -44,7 +48,7 @@ pub fn fly_all(scenario: &Scenario, designs: &[Design]) -> Vec<Flown> {
     flights
 }
 
-fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design) -> Flown {
+fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design, proofs: Option<&SupervisedProofs>) -> Flown {
     let started = Instant::now();
     let simulation = Simulation {
         plant: &*scenario.plant,
@@ -63,8 +67,14 @@ fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design) -> Flown {
     let flight = simulation.fly(&design.controller);
     let performance = performance(scenario.plant.description(), &scenario.reference, &flight);
     let seconds = started.elapsed().as_secs_f64();
-    let (bounds, claims) = step_bounds(scenario, plan, design, &performance);
-    Flown { flight, performance, bounds, claims, seconds }
+    let is_governed = !flight.trajectory.governed.is_empty();
+    let (bounds, mut claims) = match is_governed {
+        true => (Vec::new(), Vec::new()),
+        false => step_bounds(scenario, plan, design, &performance),
+    };
+    let stays = step_stays(scenario, plan, design, proofs, &flight, &performance);
+    claims.extend(stays.iter().map(|stay| stay.claim.clone()));
+    Flown { flight, performance, bounds, stays, claims, seconds }
 }
 
 /// The bound of each step, with a claim that says which of its conditions are met.

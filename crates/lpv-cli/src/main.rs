@@ -20,6 +20,7 @@ mod run;
 mod scenario;
 mod sdp;
 mod simulate;
+mod stay;
 mod table;
 mod thesis;
 mod tp;

@@ -4,6 +4,7 @@ use crate::designs::CheckedDesign;
 use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::scenario::Scenario;
+use crate::stay::StepStay;
 use lpv::certificate::{Claim, StepBound, Verdict};
 use lpv::estimator::Consistency;
 use lpv::sim::{Outcome, Performance};
@@ -17,7 +18,8 @@ pub fn trajectory_file_name(controller: &str) -> String {
 }
 
 /// A trajectory as CSV: time, states, references, inputs, whether an input was limited, accumulated cost, and where there
-/// are any measurements, estimates and their standard deviations. Column names carry units.
+/// are any measurements, estimates and their standard deviations, the references that a governor made, and of a
+/// controller with certified sets V/γ and the active member, 0 the outermost. Column names carry units.
 pub fn trajectory_csv(scenario: &Scenario, flown: &Flown) -> String {
     let description = scenario.plant.description();
     let trajectory = &flown.flight.trajectory;
@@ -39,7 +41,12 @@ pub fn trajectory_csv(scenario: &Scenario, flown: &Flown) -> String {
         columns("estimated ", &description.states);
         columns("sigma ", &description.states);
     }
-    csv.push_str(",limited,cost\n");
+    let has_governor = !trajectory.governed.is_empty();
+    let has_sets = !trajectory.set_shares.is_empty();
+    if has_governor {
+        columns("governed ", &description.states);
+    }
+    csv.push_str(if has_sets { ",V/gamma,member,limited,cost\n" } else { ",limited,cost\n" });
 
     let stride = (scenario.record_interval_s / scenario.sample_time_s).round().max(1.0) as usize;
     for k in (0..trajectory.time_s.len()).step_by(stride) {
@@ -59,6 +66,12 @@ pub fn trajectory_csv(scenario: &Scenario, flown: &Flown) -> String {
         if has_estimate {
             values(&trajectory.estimates[k]);
             values(&trajectory.deviations[k]);
+        }
+        if has_governor {
+            values(&trajectory.governed[k]);
+        }
+        if has_sets {
+            let _ = write!(csv, ",{},{}", trajectory.set_shares[k], trajectory.members[k]);
         }
         let _ = writeln!(csv, ",{},{}", u8::from(trajectory.saturated[k]), trajectory.cost[k]);
     }
@@ -99,6 +112,8 @@ pub struct ControllerRecord<'a> {
     flight_claims: &'a [Claim],
     /// The bound of each step, with the conditions that it does not meet.
     step_bounds: &'a [StepBound],
+    /// How each step of a supervised controller kept to its certified sets.
+    step_stays: &'a [StepStay],
     outcome: &'a Outcome,
     #[serde(flatten)]
     performance: &'a Performance,
@@ -124,6 +139,7 @@ impl<'a> RunRecord<'a> {
                 guaranteed_cost_verdict: bound_verdict(checked, flown),
                 flight_claims: &flown.claims,
                 step_bounds: &flown.bounds,
+                step_stays: &flown.stays,
                 outcome: &flown.flight.outcome,
                 performance: &flown.performance,
                 estimator_consistency: flown.flight.consistency.as_ref(),

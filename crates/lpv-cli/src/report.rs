@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::record::bound_verdict;
 use crate::scenario::{ControllerPlan, Scenario};
+use crate::stay::StepStay;
 use lpv::certificate::{Claim, StepBound, UnmetCondition, Verdict};
 use lpv::model::BoxWeights;
 use lpv::plant::{Description, Scene};
@@ -81,6 +82,10 @@ struct RunData<'a> {
     inputs: Vec<Series>,
     weights: Vec<Series>,
     cost: Series,
+    /// Per state, where there is a governor: the reference that it made; none where it rests all the time.
+    governed: Option<Vec<Option<Series>>>,
+    /// V/γ, of a controller that watches its certified sets.
+    set_share: Option<Series>,
     measurement: Option<Vec<Series>>,
     estimation: Option<EstimationData>,
 }
@@ -217,6 +222,15 @@ fn run<'a>(
             series(shown, &values, weights.corners.len())
         }),
         cost: sampled(shown, trajectory.cost.len(), |k| trajectory.cost[k]),
+        governed: (!trajectory.governed.is_empty()).then(|| {
+            let moves =
+                |i: usize| trajectory.governed.iter().any(|reference| reference[i] != trajectory.governed[0][i]);
+            (0..states)
+                .map(|i| moves(i).then(|| sampled(shown, trajectory.governed.len(), |k| trajectory.governed[k][i])))
+                .collect()
+        }),
+        set_share: (!trajectory.set_shares.is_empty())
+            .then(|| sampled(shown, trajectory.set_shares.len(), |k| trajectory.set_shares[k])),
         measurement: (!trajectory.measurements.is_empty()).then(|| series(shown, &trajectory.measurements, outputs)),
         estimation: flown.flight.consistency.as_ref().map(|consistency| EstimationData {
             error: estimation_errors(description, shown, trajectory),
@@ -241,6 +255,15 @@ fn estimation_errors(description: &Description, shown: &[usize], trajectory: &Tr
 
 /// What the bound of a flight is worth, in a few words: step by step where there are several.
 pub fn bound_note(flown: &Flown) -> String {
+    if flown.bounds.is_empty() && !flown.stays.is_empty() {
+        // below a governor: no bound on the cost, but a certificate of where the error stays
+        let steps = flown.stays.iter().enumerate();
+        let spell = |(k, step): (usize, &StepStay)| match step.verdict {
+            Verdict::Proved => format!("step {} certified (V ≤ {:.2} γ)", k + 1, step.stay.peak_share),
+            _ => format!("step {} not certified (V ≤ {:.2} γ)", k + 1, step.stay.peak_share),
+        };
+        return steps.map(spell).collect::<Vec<_>>().join("; ");
+    }
     let worth = |bound: &StepBound| {
         let unmet: Vec<&str> = (bound.unmet.iter())
             .map(|condition| match condition {
@@ -275,20 +298,48 @@ fn controller_line(plan: &ControllerPlan) -> String {
             format!("high-gain SLPVQR, γ = {gamma} (Theorem 5.4)")
         }
     };
+    let method = match &plan.request.rate_bounded {
+        Some(bounded) => {
+            format!("{} for parameter rates up to {}", method.replace(" at frozen parameters", ""), bounded.rate)
+        }
+        None => method,
+    };
+    let supervision = supervision_words(plan);
     let limits = if plan.request.limits.is_none() { "; inputs not limited" } else { "" };
     let feedback = match (plan.noise, plan.estimator) {
         (_, true) => "; noise, extended Kalman filter",
         (true, false) => "; process noise, state feedback",
         (false, false) => "; state feedback",
     };
-    format!("{method}{limits}{feedback}")
+    format!("{method}{limits}{supervision}{feedback}")
+}
+
+/// What is put around the design, in words.
+fn supervision_words(plan: &ControllerPlan) -> String {
+    let supervision = &plan.supervision;
+    let mut words = String::new();
+    if !supervision.inner_levels.is_empty() {
+        let levels: Vec<String> = supervision.inner_levels.iter().map(f64::to_string).collect();
+        words.push_str(&format!("; inner sets of level {}", levels.join(", ")));
+    }
+    match supervision.governor.as_ref().map(|governor| governor.feedforward) {
+        None => {}
+        Some(None) => words.push_str("; governor, static references"),
+        Some(Some(share)) => {
+            words.push_str(&format!("; governor, moving references with {:.0} % of the inputs", 100.0 * share));
+        }
+    }
+    words
 }
 
 fn notes(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> Vec<String> {
     let mut notes = vec![
         "Sign convention: u = u* − sat(K(ρ)(x − x_ref)).".to_string(),
-        "All bounds are of frozen-parameter designs: each holds for a parameter at rest, in floating point at the grid points. Nothing here is proved yet.".into(),
+        "Bounds on costs are numerical: they hold in floating point at the grid points, for a parameter at rest, or within the rate that a design was made for.".into(),
     ];
+    if designs.iter().any(|checked| checked.proofs.is_some()) {
+        notes.push("A certified step is proved for the LPV model: every claim of the design holds for every parameter value at the rate used, and this flight of the nonlinear plant stayed in the set and within the rate. The proof does not cover what linearisation leaves out; V/γ shows how much room that took.".into());
+    }
     for ((plan, checked), flown) in scenario.controllers.iter().zip(designs).zip(flights) {
         for claim in checked.claims.iter().chain(&flown.claims).filter(|claim| claim.verdict < Verdict::Numerical) {
             notes.push(format!("{}: {}: {}. {}", plan.label, claim.verdict.word(), claim.claim, claim.detail));

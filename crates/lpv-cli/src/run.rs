@@ -28,8 +28,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
     let folder = ResultFolder::begin(&scenario.result_folder(arguments.output.out.as_deref()), arguments.output.force)?;
     let checked = designs::design_all(&scenario)?;
-    let plain: Vec<_> = checked.iter().map(|checked| checked.design.clone()).collect();
-    let flown = flights::fly_all(&scenario, &plain);
+    let certified: Vec<_> = checked.iter().map(|checked| (&checked.design, checked.proofs.as_ref())).collect();
+    let flown = flights::fly_all(&scenario, &certified);
 
     designs::write_all(&scenario, &checked, &folder)?;
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {

@@ -5,6 +5,7 @@ mod controller;
 pub(crate) mod door;
 pub(crate) mod file;
 mod set_point;
+mod supervision;
 pub(crate) mod weights;
 
 use crate::failure::Failure;
@@ -17,7 +18,7 @@ use lpv::math::eigen::unstabilizable_mode;
 use lpv::model::{GridModel, LpvModel};
 use lpv::plant::{Description, Plant, PlantSpec};
 use lpv::sim::{Reference, SetPoint};
-use lpv::synthesis::{CostWeights, DesignRequest};
+use lpv::synthesis::{CostWeights, DesignRequest, Supervision};
 use set_point::{set_point, state_value};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -75,6 +76,8 @@ pub struct ControllerPlan {
     pub label: String,
     /// What to design.
     pub request: DesignRequest,
+    /// What is put around the design: nested certified sets, a reference governor.
+    pub supervision: Supervision,
     /// Fly with noise.
     pub noise: bool,
     /// Feed back the estimate of an extended Kalman filter.
@@ -177,7 +180,12 @@ impl Scenario {
             }),
         };
 
+        let moved: Vec<(usize, usize)> = (reference.set_points().iter().enumerate())
+            .flat_map(|(k, point)| point.targets.iter().map(move |&(state, _)| (state, k + 1)))
+            .collect();
         let defaults = RequestDefaults {
+            plant: &*plant,
+            set_points: &moved,
             weights: &weights,
             grid_points,
             sample_time_s,
@@ -259,7 +267,9 @@ fn numbers_per_sample(description: &Description, controllers: &[ControllerPlan])
         let measured = if plan.noise { description.outputs.len() } else { 0 };
         let estimated = if plan.estimator { 2 * n } else { 0 };
         // states, references, inputs; time, cost and the flag of saturation
-        2 * n + m + 3 + measured + estimated
+        let governed = if plan.supervision.governor.is_some() { n } else { 0 };
+        let shares = if plan.supervision.is_none() { 0 } else { 2 };
+        2 * n + m + 3 + measured + estimated + governed + shares
     };
     controllers.iter().map(of_one).sum::<usize>() as f64
 }

@@ -56,7 +56,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
             ("method", design.method == request.method),
             ("weights.q", design.weights.q == request.weights.q),
             ("weights.r", design.weights.r == request.weights.r),
-            ("controller.limits", design.controller.limits == request.limits),
+            ("controller.limits", *design.controller.actuators() == request.limits),
+            ("controller.supervisor", design.is_supervised_as(&plan.supervision, &request.limits)),
         ];
         if let Some((key, _)) = same.into_iter().find(|(_, same)| !same) {
             return Err(Failure::BadInput {
@@ -69,7 +70,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     }
     let place = arguments.output.out.clone().unwrap_or_else(|| scenario.flights_folder());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
-    let flown = flights::fly_all(&scenario, &loaded);
+    let unproved: Vec<_> = loaded.iter().map(|design| (design, None)).collect();
+    let flown = flights::fly_all(&scenario, &unproved);
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {
         folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
     }

@@ -3,10 +3,11 @@
 use super::door::Door;
 use super::file::{Bound, ControllerTable, LimitsTable, MethodName};
 use super::set_point::state_value;
+use super::supervision::supervision;
 use super::{ControllerPlan, file_name_part};
 use crate::failure::Failure;
 use lpv::controller::InputLimits;
-use lpv::plant::Description;
+use lpv::plant::{Description, Plant};
 use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method, RateBoundedOptions};
 
 /// Inputs that the high-gain method is meant for: it poses 2^m inequalities.
@@ -21,8 +22,11 @@ pub(super) struct RequestDefaults<'a> {
     pub grid_points: usize,
     pub sample_time_s: f64,
     pub limits: Option<&'a LimitsTable>,
+    pub plant: &'a dyn Plant,
     pub description: &'a Description,
     pub operating_input: &'a [f64],
+    /// States that set points move, with the number of the set point.
+    pub set_points: &'a [(usize, usize)],
 }
 
 /// Check a controller's table.
@@ -107,18 +111,21 @@ pub(super) fn controller(
     if table.estimator.is_some() && !table.noise {
         return door.refuse(format!("{key}.estimator"), "an estimator needs measurements: set noise = true");
     }
+    let request = DesignRequest {
+        name: table.name.clone(),
+        method,
+        weights: defaults.weights.clone(),
+        grid_points: defaults.grid_points,
+        schedule: table.schedule,
+        limits,
+        sample_time_s: defaults.sample_time_s,
+        rate_bounded,
+    };
+    let supervision = supervision(door, key, &table, &request, defaults)?;
     Ok(ControllerPlan {
         label,
-        request: DesignRequest {
-            name: table.name,
-            method,
-            weights: defaults.weights.clone(),
-            grid_points: defaults.grid_points,
-            schedule: table.schedule,
-            limits,
-            sample_time_s: defaults.sample_time_s,
-            rate_bounded,
-        },
+        request,
+        supervision,
         noise: table.noise,
         estimator: table.estimator.is_some(),
         require: table.require,

@@ -124,6 +124,8 @@ pub struct ControllerTable {
     pub rate_bound: Option<f64>,
     pub lyapunov_order: Option<u32>,
     pub region: Option<toml::Table>,
+    pub nested: Option<Vec<f64>>,
+    pub governor: Option<GovernorTable>,
     #[serde(default)]
     pub schedule: ScheduleKind,
     pub limits: Option<LimitsTable>,
@@ -133,6 +135,24 @@ pub struct ControllerTable {
     pub noise: bool,
     pub estimator: Option<EstimatorName>,
     pub require: Option<Verdict>,
+}
+
+#[derive(Clone, Copy, Default, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GovernorReference {
+    #[default]
+    Moving,
+    Static,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GovernorTable {
+    #[serde(default)]
+    pub reference: GovernorReference,
+    pub level: Option<f64>,
+    pub feedforward: Option<f64>,
+    pub bounds: Option<toml::Table>,
 }
 
 /// The plant of the `[plant]` table: its `name`, the rest are its parameters.

@@ -30,6 +30,41 @@ const LPVQR: &str = "method = \"lpvqr\"";
 const SLPVQR: &str = "method = \"slpvqr\"\ngamma = 2";
 const STEP: &str = "time_s = 0.5\nx_1 = 0.5";
 
+/// Nested sets and the governor: what they need, and what they allow.
+#[test]
+fn supervision() {
+    let with = |keys: &str| format!("{SLPVQR}\n{keys}");
+    let governed = |options: &str| with(&format!("governor = {{ {options} }}"));
+    let lpvqr = format!("{LPVQR}\nnested = [1]");
+    let cases: [(String, &[&str]); 13] = [
+        (with("nested = [3]"), &["controller[2].nested[1]", "is 3", "between 0 and gamma = 2"]),
+        (with("nested = [-1]"), &["controller[2].nested[1]", "is -1"]),
+        (with("nested = [1, 1]"), &["controller[2].nested[2]", "keep one"]),
+        (with("nested = []"), &["controller[2].nested", "has 0 levels", "1 to 8"]),
+        (governed("levl = 0.5"), &["unknown key `levl`", "`level`"]),
+        (governed("reference = \"fast\""), &["`moving` or `static`"]),
+        (governed("level = 1.5"), &["controller[2].governor.level", "is 1.5", "above 0 and below 1"]),
+        (governed("feedforward = 0"), &["controller[2].governor.feedforward", "is 0", "above 0 and below 1"]),
+        (
+            governed("reference = \"static\", feedforward = 0.5"),
+            &["controller[2].governor.feedforward", "moving references only"],
+        ),
+        (governed("bounds = { x_2 = 0 }"), &["controller[2].governor.bounds.x_2", "positive"]),
+        (governed("bounds = { x_1 = 1 }"), &["controller[2].governor.bounds.x_1", "set points move"]),
+        (governed("bounds = { x_3 = 1 }"), &["controller[2].governor.bounds.x_3", "allowed are x_1, x_2"]),
+        (format!("{SLPVQR}\nlimits = {{}}\ngovernor = {{}}"), &["controller[2].limits", "a limit on every input"]),
+    ];
+    for (to, words) in &cases {
+        each_refused(&[(SLPVQR, to, words)]);
+    }
+    each_refused(&[(LPVQR, &lpvqr, &["controller[1].nested", "needs a certified set"])]);
+    let moved = edited(DOUBLE_INTEGRATOR, STEP, "time_s = 0.5\nx_2 = 0.5");
+    let words = ["scenario.toml", "controller[2].governor", "set point 1 moves x_2", "a governor moves x_1"];
+    refused(edited(&moved, SLPVQR, &governed("")), 2, &words);
+    let frozen = edited(QUADROTOR, "name = \"saturated\"\n", "name = \"saturated\"\ngovernor = {}\n");
+    refused(frozen, 2, &["governor", "needs rate_bound", "psi"]);
+}
+
 #[test]
 fn misspelt_keys() {
     each_refused(&[

@@ -328,14 +328,59 @@ fn a_full_disk_behind_standard_output_is_told() {
     crate::program::Ended::from(output).refuses(2, &["standard output"]);
 }
 
-/// Every scenario that comes with the program runs, and none of its designs is refuted.
+/// The quadrotor's 100 m: every step certified by proofs, settled, with the governed reference and V/γ in the results.
+#[test]
+fn a_governed_flight_is_certified_and_recorded() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+    let text = fs::read_to_string(folder.join("quadrotor-governed.toml")).unwrap();
+    let place = Place::with(&text);
+    let table = place.succeed("run scenario.toml");
+    assert!(table.contains("step 1 certified (V ≤ 0."), "{table}");
+    assert!(table.contains("step 2 certified (V ≤ 0."), "{table}");
+    let record: Value = serde_json::from_str(&place.read("out/quadrotor-governed/run.json")).unwrap();
+    let moving = &record["controllers"][0];
+    let first = &moving["steps"][0];
+    assert!(first["settling_time_s"].as_f64().unwrap() < 10.5, "{first}");
+    for stay in moving["step_stays"].as_array().unwrap() {
+        assert_eq!(stay["verdict"], "proved");
+        assert!(stay["peak_share"].as_f64().unwrap() < 0.5 && stay["outside_s"] == 0.0, "{stay}");
+        assert!(stay["peak_rate"].as_f64().unwrap() <= 0.5);
+    }
+    let claims = moving["design_claims"].as_array().unwrap();
+    let proved = claims.iter().filter(|claim| claim["verdict"] == "proved").count();
+    assert_eq!(proved, 9, "four of each member, one of the motions");
+    assert_eq!(record["controllers"][1]["outcome"]["kind"], "diverged");
+
+    let (header, rows) = rows(&place.read("out/quadrotor-governed/trajectory-moving.csv"));
+    let column = |name: &str| header.iter().position(|found| found == name).unwrap();
+    let (governed, set_point, share) = (column("governed r_x [m]"), column("reference r_x [m]"), column("V/gamma"));
+    assert!(rows.iter().any(|row| row[governed] > 10.0 && row[governed] < 90.0 && row[set_point] == 100.0));
+    assert!(rows.iter().all(|row| row[share] < 0.5));
+    let data = report_data(&place.read("out/quadrotor-governed/report.html"));
+    assert!(data["runs"][0]["governed"][3].is_array() && data["runs"][0]["set_share"].is_array());
+    assert!(data["runs"][1]["governed"].is_null() && data["runs"][1]["set_share"].is_null());
+
+    // the saved design flies the same, and is proved again
+    let simulated = place.succeed("simulate scenario.toml");
+    assert!(simulated.contains("Moving reference: completed"), "{simulated}");
+    assert_eq!(
+        place.read("out/quadrotor-governed-flights/trajectory-moving.csv"),
+        place.read("out/quadrotor-governed/trajectory-moving.csv")
+    );
+    let certified = place.succeed("certify out/quadrotor-governed/design-moving.json");
+    assert!(certified.contains("proved: the governed reference moves as the model does"), "{certified}");
+    assert!(certified.contains("proved: inner set of level 1: the set x'P x <= 1 is invariant"), "{certified}");
+}
+
+/// Every scenario that comes with the program runs (those without a test of their own are run here), and none of its designs is refuted.
 #[test]
 fn shipped_scenarios_run() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let mut count = 0;
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        if path.extension().is_none_or(|extension| extension != "toml") {
+        let has_own_test = path.file_stem().is_some_and(|stem| stem == "quadrotor-governed");
+        if has_own_test || path.extension().is_none_or(|extension| extension != "toml") {
             continue;
         }
         let text = fs::read_to_string(path).unwrap();

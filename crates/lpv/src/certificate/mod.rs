@@ -8,11 +8,13 @@ mod inequality;
 mod proof;
 mod region;
 mod stability;
+mod supervised;
 
 pub use inequality::{BlockMargin, block_margins};
-pub use proof::{COST_INFLATION, ProofOptions, Proofs, Unprovable, lyapunov_matrix, prove};
+pub use proof::{COST_INFLATION, MotionProof, ProofOptions, Proofs, Unprovable, lyapunov_matrix, prove};
 pub use region::{StepBound, StepConditions, UnmetCondition, step_bound, unsaturated_level};
 pub use stability::{StabilityMargin, frozen_stability};
+pub use supervised::{SupervisedProofs, prove_supervised};
 
 use crate::plant::Plant;
 use crate::synthesis::Design;

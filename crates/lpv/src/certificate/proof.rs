@@ -11,8 +11,11 @@
 
 mod closed_loop;
 mod matrix;
+mod motion;
 
 pub use closed_loop::Unprovable;
+pub use motion::MotionProof;
+pub(super) use motion::prove_motion;
 
 use super::{Claim, Verdict, Witness};
 use crate::math::interval::Interval;

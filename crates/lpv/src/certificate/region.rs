@@ -111,7 +111,7 @@ fn lyapunov_matrix(design: &Design, scheduling: Option<&Scheduling>, rho: f64) -
     let parameters: Vec<f64> = design.points.iter().map(|point| point.rho).collect();
     let period = scheduling.filter(|s| s.periodic).map(|s| s.range[1] - s.range[0]);
     let n = design.points[0].p.nrows();
-    cubic_weights(&parameters, period, rho).into_iter().fold(Mat::zeros(n, n), |sum, (k, weight)| {
+    cubic_weights(&parameters, period, rho).fold(Mat::zeros(n, n), |sum, (k, weight)| {
         let p = &design.points[k].p;
         Mat::from_fn(n, n, |i, j| sum[(i, j)] + weight * p[(i, j)])
     })

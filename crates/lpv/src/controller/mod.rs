@@ -1,12 +1,26 @@
 //! Controllers as plain data: u = u* − sat(K(ρ)(x − x_ref)).
 //!
 //! [`Schedule`] carries gains to every parameter value, [`InputLimits`] saturates, [`Controller`] is the two together
-//! with the operating input.
+//! with the operating input. A [`Supervisor`] makes the certified set part of the controller: a family of gains with
+//! nested sets (`nested`), and a reference governor (`governor`) that brings the plant to any set point without leaving
+//! them. [`Law`] runs all of it at every sample and allocates nothing there.
 
+mod certified_set;
+mod governor;
+mod law;
 mod limits;
+mod motion;
+mod nested;
+mod profile;
 mod schedule;
 
+pub use certified_set::{CertifiedSet, SetEvaluator};
+pub use governor::{Governor, REFERENCE_SHARE_OF_RATE};
+pub use law::Law;
 pub use limits::InputLimits;
+pub use motion::Motion;
+pub use nested::{ENTER, Member};
+pub use profile::{MOST_ORDER, Profile};
 pub use schedule::Schedule;
 pub(crate) use schedule::cubic_weights;
 
@@ -21,29 +35,30 @@ pub struct Controller {
     pub scheduling_state: Option<usize>,
     /// u*
     pub operating_input: Vec<f64>,
-    /// What the actuators can do.
+    /// What the actuators can do; below a governor with moving references, what is left of it to the feedback.
     pub limits: InputLimits,
+    /// Certified sets that the controller knows of, and what it does with them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supervisor: Option<Supervisor>,
 }
 
-/// A controller with its work space: what runs at every sample.
-pub struct Law<'a> {
-    controller: &'a Controller,
-    gain: Vec<f64>,
+/// The certified sets of a controller, and what it does with them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Supervisor {
+    /// The certified set of the controller's own gain: the outermost.
+    pub set: CertifiedSet,
+    /// Gains for smaller sets, from the largest to the smallest.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inner: Vec<Member>,
+    /// Moves the reference.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub governor: Option<Governor>,
 }
 
-impl<'a> Law<'a> {
-    /// The control law of `controller` for `states` state components.
-    pub fn new(controller: &'a Controller, states: usize) -> Self {
-        Self { controller, gain: vec![0.0; controller.operating_input.len() * states] }
-    }
-
-    /// The input u = u* − sat(K(ρ) e) for the error e = x − x_ref at parameter ρ; true if an input was limited.
-    pub fn input(&mut self, rho: f64, error: &[f64], input: &mut [f64]) -> bool {
-        self.controller.schedule.gain_at(rho, &mut self.gain);
-        for (i, row) in self.gain.chunks_exact(error.len()).enumerate() {
-            let feedback: f64 = row.iter().zip(error).map(|(k, e)| k * e).sum();
-            input[i] = self.controller.operating_input[i] - feedback;
-        }
-        self.controller.limits.saturate(input)
+impl Controller {
+    /// What the actuators can do, all of it.
+    pub fn actuators(&self) -> &InputLimits {
+        let governor = self.supervisor.as_ref().and_then(|supervisor| supervisor.governor.as_ref());
+        governor.and_then(|governor| governor.motion.as_ref()).map_or(&self.limits, |motion| &motion.actuators)
     }
 }

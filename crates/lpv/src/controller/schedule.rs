@@ -48,8 +48,8 @@ impl Schedule {
                 }
             }
             Schedule::Vertices { weights, gains } => {
-                for (k, weight) in gains.iter().zip(weights.at(rho)) {
-                    add_scaled(gain, weight, k);
+                for (vertex, k) in gains.iter().enumerate() {
+                    add_scaled(gain, weights.weight(vertex, rho), k);
                 }
             }
         }
@@ -74,7 +74,7 @@ impl Schedule {
                 let width = count.min(4);
                 let first = piece as isize - (width as isize - 1) / 2;
                 let first = if period.is_some() { first } else { first.clamp(0, (count - width) as isize) };
-                (lagrange_weights(first, width, count, position), &gains[0])
+                (lagrange_weights(first, width, count, position).collect(), &gains[0])
             }
             Schedule::Vertices { weights, gains } => (weights.at(rho).into_iter().enumerate().collect(), &gains[0]),
         };
@@ -116,15 +116,17 @@ fn add_scaled(sum: &mut [f64], factor: f64, matrix: &Mat<f64>) {
 ///
 /// A periodic grid wraps; otherwise `rho` is clamped to the grid and the window moved inside it. Grids of fewer than four
 /// points use all of them.
-pub(crate) fn cubic_weights(parameters: &[f64], period: Option<f64>, rho: f64) -> Vec<(usize, f64)> {
+pub(crate) fn cubic_weights(
+    parameters: &[f64],
+    period: Option<f64>,
+    rho: f64,
+) -> impl Iterator<Item = (usize, f64)> + use<> {
     let count = parameters.len();
-    if count == 1 {
-        return vec![(0, 1.0)];
-    }
-    let step = parameters[1] - parameters[0];
+    let step = if count > 1 { parameters[1] - parameters[0] } else { 1.0 };
     let width = count.min(4);
     // position in units of the step, and the first point of the window
     let (position, first) = match period {
+        _ if count == 1 => (0.0, 0),
         Some(period) => {
             let position = (rho - parameters[0]).rem_euclid(period) / step;
             (position, position.floor() as isize - (width as isize - 1) / 2)
@@ -138,16 +140,19 @@ pub(crate) fn cubic_weights(parameters: &[f64], period: Option<f64>, rho: f64) -
 }
 
 /// Weights of the polynomial through `width` nodes from `first` on, of a grid of `count` that wraps.
-fn lagrange_weights<S: Scalar>(first: isize, width: usize, count: usize, position: S) -> Vec<(usize, S)> {
-    (0..width)
-        .map(|i| {
-            let node = (first + i as isize) as f64;
-            let weight = (0..width).filter(|&j| j != i).fold(S::from(1.0), |product, j| {
-                product * (position - (first + j as isize) as f64) / (node - (first + j as isize) as f64)
-            });
-            ((first + i as isize).rem_euclid(count as isize) as usize, weight)
-        })
-        .collect()
+fn lagrange_weights<S: Scalar>(
+    first: isize,
+    width: usize,
+    count: usize,
+    position: S,
+) -> impl Iterator<Item = (usize, S)> {
+    (0..width).map(move |i| {
+        let node = (first + i as isize) as f64;
+        let weight = (0..width).filter(|&j| j != i).fold(S::from(1.0), |product, j| {
+            product * (position - (first + j as isize) as f64) / (node - (first + j as isize) as f64)
+        });
+        ((first + i as isize).rem_euclid(count as isize) as usize, weight)
+    })
 }
 
 #[cfg(test)]
@@ -160,7 +165,7 @@ mod tests {
         (0..1000)
             .map(|k| {
                 let rho = -4.0 + 0.009 * k as f64;
-                let value: f64 = cubic_weights(&grid, Some(TAU), rho).iter().map(|&(k, w)| w * grid[k].sin()).sum();
+                let value: f64 = cubic_weights(&grid, Some(TAU), rho).map(|(k, w)| w * grid[k].sin()).sum();
                 (value - rho.sin()).abs()
             })
             .fold(0.0, f64::max)
@@ -177,7 +182,7 @@ mod tests {
     fn cubics_are_exact_up_to_the_ends_and_constant_beyond() {
         let grid: Vec<f64> = (0..7).map(|k| 0.5 * k as f64).collect();
         let cubic = |x: f64| 1.0 - 2.0 * x + 0.3 * x.powi(3);
-        let value = |rho: f64| cubic_weights(&grid, None, rho).iter().map(|&(k, w)| w * cubic(grid[k])).sum::<f64>();
+        let value = |rho: f64| cubic_weights(&grid, None, rho).map(|(k, w)| w * cubic(grid[k])).sum::<f64>();
         for rho in [0.0, 0.1, 1.3, 2.9, 3.0] {
             assert!((value(rho) - cubic(rho)).abs() < 1e-12);
         }

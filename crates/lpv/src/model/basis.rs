@@ -110,6 +110,54 @@ impl MatrixFunction {
         self.combine(|function| derivative(&function.at(&seeded), 0))
     }
 
+    /// Add M(ρ) of a single parameter to `sum`, in row order; allocates nothing.
+    pub fn add_to(&self, rho: f64, sum: &mut [f64]) {
+        for (function, coefficient) in self.basis.iter().zip(&self.coefficients) {
+            let factor = function.at(&[rho]);
+            let columns = coefficient.ncols();
+            for j in 0..columns {
+                for i in 0..coefficient.nrows() {
+                    sum[i * columns + j] += factor * coefficient[(i, j)];
+                }
+            }
+        }
+    }
+
+    /// Add `scale` M(ρ)z of a single parameter to `sum`; allocates nothing.
+    pub fn add_product(&self, rho: f64, z: &[f64], scale: f64, sum: &mut [f64]) {
+        for (function, coefficient) in self.basis.iter().zip(&self.coefficients) {
+            let factor = scale * function.at(&[rho]);
+            if factor != 0.0 {
+                for (i, sum) in sum.iter_mut().enumerate() {
+                    *sum += factor * row_product(coefficient, i, z);
+                }
+            }
+        }
+    }
+
+    /// A bound on |(M(ρ)z)ᵢ| over all values of a single parameter, for constants and harmonics: |c₀| + Σₖ √(cₖ² + sₖ²) of the
+    /// coefficients of the row's product with z. Infinite if there is a power.
+    pub fn bound_of_product(&self, z: &[f64], row: usize) -> f64 {
+        let product = |k: usize| row_product(&self.coefficients[k], row, z);
+        let sine = |harmonic: u32| {
+            let is_sine = |f: &BasisFunction| matches!(*f, BasisFunction::Sin { harmonic: h, .. } if h == harmonic);
+            self.basis.iter().position(is_sine).map_or(0.0, product)
+        };
+        let cosine = |harmonic: u32| {
+            let is_cosine = |f: &BasisFunction| matches!(*f, BasisFunction::Cos { harmonic: h, .. } if h == harmonic);
+            self.basis.iter().any(is_cosine)
+        };
+        let terms = self.basis.iter().enumerate().map(|(k, function)| match *function {
+            BasisFunction::Constant => product(k).abs(),
+            BasisFunction::Cos { harmonic, .. } => product(k).hypot(sine(harmonic)),
+            BasisFunction::Sin { harmonic, .. } if cosine(harmonic) => 0.0,
+            BasisFunction::Sin { .. } => product(k).abs(),
+            BasisFunction::Power { .. } if product(k) == 0.0 => 0.0,
+            BasisFunction::Power { .. } => f64::INFINITY,
+        });
+        terms.sum()
+    }
+
     fn combine(&self, factor: impl Fn(&BasisFunction) -> f64) -> Mat<f64> {
         let (rows, columns) = self.shape();
         let mut sum = Mat::zeros(rows, columns);
@@ -150,9 +198,37 @@ impl MatrixFunction {
     }
 }
 
+/// (Mz)ᵢ
+fn row_product(matrix: &Mat<f64>, row: usize, z: &[f64]) -> f64 {
+    z.iter().enumerate().map(|(j, z)| matrix[(row, j)] * z).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn products_are_bounded_over_the_circle() {
+        let basis = BasisFunction::harmonics(0, 2);
+        let coefficients: Vec<_> =
+            (0..5).map(|k| Mat::from_fn(2, 3, |i, j| ((k * 7 + 3 * i + 2 * j) as f64).sin())).collect();
+        let function = MatrixFunction { basis, coefficients };
+        let z = [0.3, -1.2, 0.8];
+        for row in 0..2 {
+            let bound = function.bound_of_product(&z, row);
+            let mut most = 0.0f64;
+            for k in 0..1000 {
+                let (mut sum, mut entries) = ([0.0; 2], [0.0; 6]);
+                let rho = 0.00628 * f64::from(k);
+                function.add_product(rho, &z, 2.0, &mut sum);
+                function.add_to(rho, &mut entries);
+                let product: f64 = (0..3).map(|j| entries[3 * row + j] * z[j]).sum();
+                assert!((sum[row] - 2.0 * product).abs() < 1e-13);
+                most = most.max(product.abs());
+            }
+            assert!(most <= bound && bound < 2.0 * most, "{most} {bound}");
+        }
+    }
 
     #[test]
     fn derivatives_are_those_of_differences() {

@@ -32,11 +32,13 @@ impl BoxWeights {
 
     /// The weights at parameter `rho`.
     pub fn at<S: Scalar>(&self, rho: S) -> Vec<S> {
-        let features: Vec<S> = self.features.iter().map(|feature| feature.value(rho)).collect();
-        let weight = |corner: &Vec<f64>| {
-            corner.iter().zip(&features).fold(S::from(1.0), |product, (&c, &f)| product * ((f * c + 1.0) / 2.0))
-        };
-        self.corners.iter().map(weight).collect()
+        (0..self.corners.len()).map(|i| self.weight(i, rho)).collect()
+    }
+
+    /// Weight `i` at parameter `rho`; allocates nothing.
+    pub fn weight<S: Scalar>(&self, i: usize, rho: S) -> S {
+        let factors = self.corners[i].iter().zip(&self.features);
+        factors.fold(S::from(1.0), |product, (&c, feature)| product * ((feature.value(rho) * c + 1.0) / 2.0))
     }
 
     /// The vertex matrices Mᵢ with Σ wᵢ(ρ_k) Mᵢ closest to the `samples` at `parameters`, entry by entry in the

@@ -72,6 +72,12 @@ pub struct Trajectory {
     pub states: Vec<Vec<f64>>,
     /// x_ref(t)
     pub references: Vec<Vec<f64>>,
+    /// The reference that a governor made of x_ref(t); empty without one.
+    pub governed: Vec<Vec<f64>>,
+    /// Which member of a family of gains was active, 0 the outermost; empty for a controller without certified sets.
+    pub members: Vec<usize>,
+    /// V/γ of the error that the controller saw, in the active member's set; empty for a controller without certified sets.
+    pub set_shares: Vec<f64>,
     /// u(t), after saturation, held until the next sample.
     pub inputs: Vec<Vec<f64>>,
     /// Whether an input was limited.
@@ -127,7 +133,7 @@ impl Simulation<'_> {
         }
 
         let stage_cost = StageCost::new(self.state_weight, self.input_weight);
-        let mut law = Law::new(controller, n);
+        let mut law = Law::new(controller, description, self.sample_time_s, &self.initial_state);
         let mut method = RungeKutta4::new(size);
         let mut trajectory = Trajectory::default();
         let (mut u, mut w, mut v, mut y) = (vec![0.0; m], vec![0.0; nw], vec![0.0; ny], vec![0.0; ny]);
@@ -152,9 +158,7 @@ impl Simulation<'_> {
             }
             let reference = self.reference.at(t_s);
             let feedback = if filter.is_some() { &z[n + 1..2 * n + 1] } else { &z[..n] };
-            description.state_error(feedback, &reference, &mut error);
-            let rho = controller.scheduling_state.map_or(0.0, |state| feedback[state]);
-            let saturated = law.input(rho, &error, &mut u);
+            let saturated = law.step(t_s, feedback, &reference, &mut u);
             if let Some(process) = &mut process {
                 process.next(&mut w);
             }
@@ -169,6 +173,13 @@ impl Simulation<'_> {
                 statistics.add(&error, covariance);
                 trajectory.estimates.push(estimate.to_vec());
                 trajectory.deviations.push((0..n).map(|i| covariance[i * n + i].max(0.0).sqrt()).collect());
+            }
+            if let Some(governed) = law.governed_reference() {
+                trajectory.governed.push(governed.to_vec());
+            }
+            if let Some((member, share)) = law.set_share() {
+                trajectory.members.push(member);
+                trajectory.set_shares.push(share);
             }
             trajectory.time_s.push(t_s);
             trajectory.states.push(z[..n].to_vec());

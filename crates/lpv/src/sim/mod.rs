@@ -11,6 +11,7 @@ mod optimal;
 mod performance;
 mod reference;
 mod runge_kutta;
+mod stay;
 
 pub use adaptive::{AdaptiveOptions, ContinuousFlight, IntegrationError, fly_continuously};
 pub use closed_loop::{FARTHEST, Flight, Outcome, Simulation, Trajectory};
@@ -19,3 +20,4 @@ pub use optimal::{OptimalError, OptimalTrajectory, optimal_trajectory};
 pub use performance::{Performance, StepResponse, performance};
 pub use reference::{Reference, SetPoint};
 pub use runge_kutta::RungeKutta4;
+pub use stay::{SetStay, set_stay};

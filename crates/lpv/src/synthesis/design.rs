@@ -117,6 +117,10 @@ pub struct Design {
     /// frozen design nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_bounded: Option<RateBounded>,
+    /// The designs of the smaller sets of a family, from the largest to the smallest; each is a whole design, certified by
+    /// itself. Their gains fly as members of the controller's supervisor.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub inner: Vec<Design>,
 }
 
 /// What a design is asked for.
@@ -222,11 +226,13 @@ pub(super) fn assemble(
             scheduling_state: model.scheduling.as_ref().map(|scheduling| scheduling.state),
             operating_input,
             limits: request.limits.clone(),
+            supervisor: None,
         },
         schedule_error,
         back_off,
         points,
         rate_bounded,
+        inner: Vec::new(),
     }
 }
 

@@ -13,10 +13,14 @@
 //! (`rate_bounded`, [`RateBoundedOptions`]) one Lyapunov matrix Y(ρ), smooth in the parameter, serves the whole range, and
 //! the bounds are for every motion within that rate.
 //!
+//! `supervision` puts a family of nested certified sets and a reference governor around a design; `flatness` finds the motions
+//! that a governed reference can make.
+//!
 //! To add a method: one file with its inequalities, one variant in [`Method`].
 
 mod back_off;
 mod design;
+mod flatness;
 mod high_gain;
 mod inequality;
 mod lpvqr;
@@ -25,6 +29,8 @@ pub mod polytopic;
 mod rate_bounded;
 mod region;
 mod slpvqr;
+mod supervision;
+mod supervision_validation;
 mod validation;
 
 pub use design::{CostWeights, Design, DesignRequest, FrozenDesign, Method, ScheduleKind, design};
@@ -32,6 +38,7 @@ pub use high_gain::HighGainOptions;
 pub use lpvqr::lqr_by_inequality;
 pub use rate_bounded::{RateBounded, RateBoundedOptions};
 pub use region::covering_level;
+pub use supervision::{GovernorOptions, Supervision, SupervisionError, design_supervised, governed_states, governor};
 pub use validation::DesignError;
 
 /// Why there is no design.
@@ -86,6 +93,9 @@ pub enum SynthesisError {
         /// Points of the grid.
         points: usize,
     },
+    /// The design cannot be supervised as asked.
+    #[error("no supervised controller: {0}")]
+    Supervision(#[from] SupervisionError),
     /// No gain on the high-gain segment is stable at the controller's sample time.
     #[error("no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster")]
     SampleTime {

@@ -9,7 +9,7 @@ use crate::model::{BasisFunction, BoxWeights, MatrixFunction, parameter_grid};
 use crate::plant::{Plant, PlantParameterError, Scheduling};
 
 /// Relative difference up to which numbers of a file count as equal: what printing and reading elsewhere may leave.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 
 /// A design whose parts do not fit together.
 #[derive(Debug, thiserror::Error, PartialEq)]
@@ -29,7 +29,11 @@ pub enum DesignError {
     },
 }
 
-fn refuse(key: impl Into<String>, found: impl Into<String>, expected: impl Into<String>) -> Result<(), DesignError> {
+pub(super) fn refuse(
+    key: impl Into<String>,
+    found: impl Into<String>,
+    expected: impl Into<String>,
+) -> Result<(), DesignError> {
     Err(DesignError::Part { key: key.into(), found: found.into(), expected: expected.into() })
 }
 
@@ -82,7 +86,8 @@ impl Design {
         if let Some(bounded) = &self.rate_bounded {
             self.validate_rate_bounded(bounded, scheduling, m, n)?;
         }
-        self.validate_controller(&*plant, m, n)
+        self.validate_controller(&*plant, m, n)?;
+        self.validate_supervisor(&*plant)
     }
 
     fn validate_rate_bounded(
@@ -206,14 +211,14 @@ impl Design {
     }
 }
 
-fn shape(key: &str, matrix: &Mat<f64>, rows: usize, columns: usize) -> Result<(), DesignError> {
+pub(super) fn shape(key: &str, matrix: &Mat<f64>, rows: usize, columns: usize) -> Result<(), DesignError> {
     if (matrix.nrows(), matrix.ncols()) != (rows, columns) {
         return refuse(key, format!("is {} × {}", matrix.nrows(), matrix.ncols()), format!("{rows} × {columns}"));
     }
     if is_finite(matrix) { Ok(()) } else { refuse(key, "has an entry that is not finite", "finite") }
 }
 
-fn function(key: &str, function: &MatrixFunction, rows: usize, columns: usize) -> Result<(), DesignError> {
+pub(super) fn function(key: &str, function: &MatrixFunction, rows: usize, columns: usize) -> Result<(), DesignError> {
     let (basis, coefficients) = (function.basis.len(), function.coefficients.len());
     if basis == 0 || basis != coefficients {
         let found = format!("has {basis} basis functions and {coefficients} coefficients");

@@ -3,6 +3,7 @@
 mod closed_loop;
 mod costs;
 mod filter;
+mod governed;
 mod jacobians;
 mod layering;
 mod moving_parameter;

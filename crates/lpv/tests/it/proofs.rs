@@ -90,6 +90,7 @@ fn no_mutation_that_is_false_is_proved() {
                 scheduling_state: None,
                 limits: InputLimits::none(1),
                 operating_input: vec![0.0],
+                supervisor: None,
             },
             schedule_error: 0.0,
             back_off: 0.0,
@@ -103,6 +104,7 @@ fn no_mutation_that_is_false_is_proved() {
                 iterations: 0,
             }],
             rate_bounded: None,
+            inner: Vec::new(),
         };
         let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
         for (words, cost) in [("decreases", None), ("the cost", Some((&weights.q, 0.0625)))] {

@@ -265,7 +265,7 @@ impl Form {
     }
 }
 
-fn combine(function: &MatrixFunction, factors: &[Taylor]) -> TaylorMatrix {
+pub(super) fn combine(function: &MatrixFunction, factors: &[Taylor]) -> TaylorMatrix {
     let (rows, columns) = function.shape();
     TaylorMatrix::from_fn(rows, columns, |i, j| {
         let terms = factors.iter().zip(&function.coefficients).filter(|(_, m)| m[(i, j)] != 0.0);
