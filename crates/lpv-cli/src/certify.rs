@@ -21,6 +21,9 @@ pub struct CertifyArguments {
     /// Level of the set x'P x <= REGION that is to be certified [default: the design's gamma]
     #[arg(long)]
     region: Option<f64>,
+    /// Also prove the largest set x'P x <= c that is invariant for the nonlinear plant (takes longer)
+    #[arg(long)]
+    nonlinear: bool,
     /// Print the claims as JSON instead of text
     #[arg(long)]
     json: bool,
@@ -57,7 +60,8 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     positive("--region", arguments.region, f64::MIN_POSITIVE)?;
     let mut claims = check(&design, &*plant);
     let mut verdict = designs::worst(&claims);
-    match prove(&design, &*plant, &ProofOptions { rate: arguments.rate, level: arguments.region }) {
+    let options = ProofOptions { rate: arguments.rate, level: arguments.region, nonlinear: arguments.nonlinear };
+    match prove(&design, &*plant, &options) {
         Ok(proofs) => {
             // the rates found for a frozen design are a finding, not a claim that it makes
             let counted = |claim: &&Claim| proofs.asked || claim.verdict == Verdict::Refuted;

@@ -10,7 +10,7 @@ mod region;
 mod stability;
 
 pub use inequality::{BlockMargin, block_margins};
-pub use proof::{COST_INFLATION, ProofOptions, Proofs, Unprovable, lyapunov_matrix, prove};
+pub use proof::{COST_INFLATION, NonlinearProof, ProofOptions, Proofs, Unprovable, lyapunov_matrix, prove};
 pub use region::{StepBound, StepConditions, UnmetCondition, step_bound, unsaturated_level};
 pub use stability::{StabilityMargin, frozen_stability};
 

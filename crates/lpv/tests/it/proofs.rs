@@ -158,18 +158,16 @@ fn rates_of_the_frozen_designs() {
         let rate = proofs.stable_up_to.unwrap();
         assert!((0.9 * expected..1.005 * expected).contains(&rate), "{rate} is not {expected}");
         // beyond it there is a motion along which V grows
-        let beyond = prove(&design, &*plant, &ProofOptions { rate: Some(1.2 * expected), level: None }).unwrap();
+        let beyond =
+            prove(&design, &*plant, &ProofOptions { rate: Some(1.2 * expected), ..ProofOptions::default() }).unwrap();
         let claim = beyond.claims.iter().find(|claim| claim.verdict == Verdict::Refuted).unwrap();
         let witness = claim.witness.as_ref().unwrap();
         assert!(witness.value < 0.0 && witness.state.len() == 12 && witness.rate.abs() > expected);
     }
 }
 
-/// The full circle at ±2 rad/s, and then random yaws, rates and states: V falls by the cost, and the input stays unsaturated
-/// in the set.
-#[test]
-fn a_design_for_a_rate_is_proved_and_samples_agree() {
-    let plant = plant();
+/// SLPVQR with γ = 1, made for yaw rates up to 2 rad/s and for the reach along x.
+fn made_for_a_rate() -> Design {
     let mut direction = vec![0.0; 12];
     direction[3] = 1.0;
     let request = DesignRequest {
@@ -182,7 +180,20 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
         sample_time_s: 0.002,
         rate_bounded: Some(RateBoundedOptions { rate: 2.0, order: 2, direction: Some(direction) }),
     };
-    let design = design(&spec(9.807), &*plant, &request, &|_| {}).unwrap();
+    design(&spec(9.807), &*plant(), &request, &|_| {}).unwrap()
+}
+
+/// Random states x with xᵀPx at most `level`.
+fn inside(numbers: &mut Numbers, p: &Mat<f64>, level: f64) -> Vec<f64> {
+    let x: Vec<f64> = (0..12).map(|_| numbers.next()).collect();
+    let scale = (level / quadratic_form(p, &x)).sqrt() * numbers.next().abs();
+    x.iter().map(|value| scale * value).collect()
+}
+
+/// The full circle at ±2 rad/s, and then random yaws, rates and states: V falls by the cost, and the input stays unsaturated
+/// in the set.
+fn proved_and_sampled(matrices: usize, states: usize) {
+    let (plant, design) = (plant(), made_for_a_rate());
     let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
     assert!(proofs.claims.iter().all(|claim| claim.verdict == Verdict::Proved), "{:?}", proofs.claims);
     assert_eq!((proofs.stable_up_to, proofs.cost_up_to, proofs.level), (Some(2.0), Some(2.0), Some(1.0)));
@@ -191,7 +202,7 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
 
     let y = &design.rate_bounded.as_ref().unwrap().y;
     let mut numbers = Numbers(3);
-    for _ in 0..2000 {
+    for _ in 0..matrices {
         let (rho, rate) = (3.2 * numbers.next(), 2.0 * numbers.next());
         let p = lyapunov_matrix(&design, &*plant, rho).unwrap();
         let p_rate = -1.0 * (&p * (rate * y.derivative(&[rho], 0)) * &p);
@@ -200,7 +211,7 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
         let flow = &p * (&model.a - &model.b * &k);
         let stage = &design.weights.q + k.transpose() * &design.weights.r * &k;
         let change = proofs.cost_factor * (&flow + flow.transpose() + &p_rate) + &stage;
-        for _ in 0..50 {
+        for _ in 0..states {
             let mut x: Vec<f64> = (0..12).map(|_| numbers.next()).collect();
             assert!(quadratic_form(&change, &x) < 0.0, "yaw {rho}, rate {rate}, {x:?}");
             let scale = (1.0 / quadratic_form(&p, &x)).sqrt();
@@ -210,6 +221,48 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
                 assert!(input.abs() <= 9.807 / 2.0, "yaw {rho}, input {i}: {input}");
             }
         }
+    }
+}
+
+#[test]
+fn a_design_for_a_rate_is_proved_and_samples_agree() {
+    proved_and_sampled(1000, 20);
+}
+
+#[test]
+#[ignore = "a million samples: run it in release"]
+fn a_million_samples_agree() {
+    proved_and_sampled(20_000, 50);
+}
+
+/// Of the nonlinear plant: in the proved set V falls along its equations with the gain that flies, and the set is in the box.
+#[test]
+fn the_set_is_invariant_for_the_nonlinear_plant() {
+    let (plant, design) = (plant(), made_for_a_rate());
+    let options = ProofOptions { level: Some(0.005), nonlinear: true, ..ProofOptions::default() };
+    let proofs = prove(&design, &*plant, &options).unwrap();
+    let nonlinear = proofs.nonlinear.expect("something is proved");
+    assert_eq!(claim(&proofs.claims, "the nonlinear plant: x'P x <=").verdict, Verdict::Proved);
+    assert!(nonlinear.level >= 0.0049 && nonlinear.rate < 2.0, "{nonlinear:?}");
+    let y = &design.rate_bounded.as_ref().unwrap().y;
+    let mut numbers = Numbers(11);
+    for _ in 0..2000 {
+        let psi = 3.2 * numbers.next();
+        let p = lyapunov_matrix(&design, &*plant, psi).unwrap();
+        let e = inside(&mut numbers, &p, nonlinear.level);
+        for &(i, radius) in &nonlinear.radii {
+            assert!(e[i].abs() <= radius, "state {i}: {} is more than {radius}", e[i]);
+        }
+        let k = design.controller.schedule.gain_matrix(psi);
+        let u: Vec<f64> = (0..4).map(|i| 9.807 / 2.0 - (0..12).map(|j| k[(i, j)] * e[j]).sum::<f64>()).collect();
+        let mut x = e.clone();
+        x[11] = psi;
+        let mut dx = vec![0.0; 12];
+        plant.dynamics(&x, &u, &[0.0; 4], &mut dx);
+        assert!(dx[11].abs() <= nonlinear.rate);
+        let p_rate = -1.0 * (&p * (dx[11] * y.derivative(&[psi], 0)) * &p);
+        let along: f64 = (0..12).map(|i| (0..12).map(|j| 2.0 * e[i] * p[(i, j)] * dx[j]).sum::<f64>()).sum();
+        assert!(along + quadratic_form(&p_rate, &e) < 0.0, "yaw {psi}, {e:?}");
     }
 }
 

@@ -118,9 +118,8 @@ pub(super) enum Definiteness {
 }
 
 impl CellMatrix {
-    /// From the Taylor forms at the middle and over the cell; the symmetric part is taken. A cell within another may take the
-    /// second derivatives of that: `over` is then the other's matrix.
-    pub fn new(middle: &TaylorMatrix, over: Result<&TaylorMatrix, &CellMatrix>) -> Self {
+    /// From the Taylor forms at the middle and over the cell; the symmetric part is taken.
+    pub fn new(middle: &TaylorMatrix, over: &TaylorMatrix) -> Self {
         let n = middle.rows;
         let half = |x: Interval| x * 0.5;
         let entry = |at: usize| (at / n, at % n);
@@ -131,10 +130,7 @@ impl CellMatrix {
             n,
             value: symmetric(&|i, j| middle.at(i, j).value),
             slope: symmetric(&|i, j| middle.at(i, j).slope),
-            bend: match over {
-                Ok(over) => symmetric(&|i, j| over.at(i, j).bend.unwrap_or(Interval::ENTIRE)),
-                Err(outer) => outer.bend.clone(),
-            },
+            bend: symmetric(&|i, j| over.at(i, j).bend.unwrap_or(Interval::ENTIRE)),
         }
     }
 
@@ -150,13 +146,24 @@ impl CellMatrix {
         Self { n, value: sum(&|m| &m.value), slope: sum(&|m| &m.slope), bend: sum(&|m| &m.bend) }
     }
 
+    /// The value in the middle, as numbers.
+    pub fn middle(&self) -> Mat<f64> {
+        Mat::from_fn(self.n, self.n, |i, j| self.value[i * self.n + j].middle())
+    }
+
+    /// Nothing is known.
+    pub fn unbounded(n: usize) -> Self {
+        let entire = vec![Interval::ENTIRE; n * n];
+        Self { n, value: entire.clone(), slope: entire.clone(), bend: entire }
+    }
+
     /// Is −M, or M, positive definite for all |t − c| ≤ `half`?
     ///
     /// With T ≈ L⁻ᵀ for M(c) ≈ LLᵀ the matrix TᵀM(t)T is near I; it is positive definite, and with it M(t) and T regular, if
     /// every row of its difference to I sums to less than 1 in absolute values (Gershgorin).
     pub fn is_positive(&self, half: f64) -> Definiteness {
         let n = self.n;
-        let middle = Mat::from_fn(n, n, |i, j| self.value[i * n + j].middle());
+        let middle = self.middle();
         let Some(inverse) = cholesky_inverse(&middle) else { return self.refutation(&middle) };
         // Tᵀ = L⁻¹, row order
         let factor = |i: usize, j: usize| inverse[(i, j)];
