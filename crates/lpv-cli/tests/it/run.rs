@@ -73,7 +73,7 @@ fn writes_a_whole_result() {
     );
     for word in [
         "controller",
-        "guaranteed cost (verdict)",
+        "cost bound (verdict)",
         "actual cost",
         "settling",
         "peak input",

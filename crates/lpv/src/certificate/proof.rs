@@ -10,11 +10,16 @@
 //! and what is not.
 
 mod closed_loop;
+mod gain;
 mod matrix;
 mod nonlinear;
+mod polytopic;
+mod sampled;
 
 pub use closed_loop::Unprovable;
+pub use gain::prove_gain;
 pub use nonlinear::NonlinearProof;
+pub use polytopic::{PolytopicClaim, PolytopicLyapunov, prove_polytopic};
 
 use super::{Claim, Verdict, Witness};
 use crate::math::interval::Interval;
@@ -29,6 +34,11 @@ use std::time::Instant;
 /// largest rate is sought.
 const LEAST_HALF: f64 = 1.0 / 2048.0;
 const LEAST_HALF_OF_SEARCH: f64 = 1.0 / 1024.0;
+/// Parts that an open cell is cut into at most, and what their number is multiplied by.
+const MOST_PARTS: f64 = 8.0;
+const FEWER: f64 = 0.95;
+/// Cells reach over their ends by this, in pieces: far more than the rounding of their ends, which lie below 2^14.
+const OVERLAP: f64 = 1e-10;
 /// What the level of the certified set is multiplied by until it is proved: between grid points a little is lost.
 const LEVELS: [f64; 5] = [1.0, 0.999, 0.995, 0.98, 0.9];
 /// By this factor the cost bound of a frozen design may be exceeded when it is proved for a moving parameter.
@@ -109,28 +119,34 @@ impl<'a, M: Send + Sync> Cells<'a, M> {
                     cells.push(cell);
                     continue;
                 }
-                let mut open = false;
+                let mut open: Option<f64> = None;
                 for (rate, definiteness) in claims(&cell.matrix, half) {
                     match definiteness {
                         Definiteness::Proved(found) => margin = margin.min(found),
                         Definiteness::Refuted { direction, value } => {
                             outcome = Some(Attempt::Refuted { t: middle, rate, direction, value });
                         }
-                        Definiteness::Open => open = true,
+                        Definiteness::Open { fits } => open = Some(open.map_or(fits, |other| other.min(fits))),
                     }
                 }
-                if !open || outcome.is_some() {
+                let Some(fits) = open.filter(|_| outcome.is_none()) else {
                     cells.push(cell);
                     continue;
-                }
+                };
                 if 0.5 * half < least {
                     outcome = Some(Attempt::Open { t: middle, half });
                     cells.push(cell);
                     continue;
                 }
-                let half = 0.5 * half;
+                // at once into as many as will do; bounds on a smaller cell are tighter, hence a little fewer
+                let wanted = if fits > 0.0 { (FEWER * half / fits).ceil() } else { 2.0 };
+                let parts = wanted.clamp(2.0, MOST_PARTS).min((half / least).floor());
+                // a little wider than their share, so that rounding leaves no gap
+                let (share, parts) = (half / parts, parts as usize);
+                let half = share + OVERLAP;
                 // the left one is next
-                for middle in [middle + half, middle - half] {
+                for part in (0..parts).rev() {
+                    let middle = middle + share * (2 * part + 1) as f64 - share * parts as f64;
                     let place = Place { middle, half, ..cell.place };
                     left.push(Cell { place, matrix: enclose(&place) });
                 }
@@ -178,7 +194,8 @@ pub struct Proofs {
 /// 3. V falls along every motion of the LPV model with |ρ̇| ≤ r, under every mixture of saturated rows, so that {V ≤ γ} is
 ///    invariant;
 /// 4. the cost is at most V(x(0)) times a factor for |ρ̇| ≤ r;
-/// 5. where it is asked for, the largest set {V ≤ c} that is invariant for the nonlinear plant.
+/// 5. the loop with zero-order hold at the design's sample time is stable at every fixed ρ, while no input saturates;
+/// 6. where it is asked for, the largest set {V ≤ c} that is invariant for the nonlinear plant.
 pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Result<Proofs, Unprovable> {
     let closed_loop = ClosedLoop::new(design, plant)?;
     let parameter = plant.description().scheduling.as_ref();
@@ -239,6 +256,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         }
         claims.push(claim);
     }
+    claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
     let mut nonlinear = None;
     if options.nonlinear {
         let (found, proof) = nonlinear::prove(&closed_loop, &words, level);
@@ -284,6 +302,7 @@ impl Words {
                     rate,
                     state: closed_loop.state(t, &direction),
                     value,
+                    ..Witness::default()
                 };
                 let detail = format!("fails{} with rate {rate:.4}", place(t));
                 (Verdict::Refuted, value, detail, Some(witness))

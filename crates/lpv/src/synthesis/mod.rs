@@ -16,6 +16,7 @@
 //! To add a method: one file with its inequalities, one variant in [`Method`].
 
 mod back_off;
+pub mod bounded_real;
 mod design;
 mod high_gain;
 mod inequality;

@@ -1,12 +1,15 @@
 //! What is proved stays true under exact arithmetic and random sampling, and what is false is never proved.
 
 use crate::quadrotor::{limits, plant, spec, weights};
-use lpv::certificate::{Claim, ProofOptions, Verdict, lyapunov_matrix, prove};
+use lpv::certificate::{
+    Claim, PolytopicClaim, PolytopicLyapunov, ProofOptions, Verdict, lyapunov_matrix, prove, prove_polytopic,
+};
 use lpv::controller::{InputLimits, Schedule};
 use lpv::math::Mat;
 use lpv::math::matrix::{diagonal, quadratic_form};
-use lpv::model::{MatrixFunction, linearize};
+use lpv::model::{MatrixFunction, Polytope, linearize};
 use lpv::plant::{LinearParameters, PlantSpec};
+use lpv::synthesis::polytopic::InputBounds;
 use lpv::synthesis::{CostWeights, Design, DesignRequest, Method, RateBoundedOptions, ScheduleKind, design};
 
 /// A stream of numbers in (−1, 1) from a seed.
@@ -142,6 +145,86 @@ fn the_edge_is_found() {
         design.controller.schedule = Schedule::Constant { gain: scalar(0.5) };
         let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
         assert_eq!(claim(&proofs.claims, "the cost").verdict, expected, "P = {p}");
+    }
+}
+
+/// ẋ = x + u with u = −2x held for T: x₊ = (2 − e^T)x, stable up to T = ln 3; and ẋ = u, whose series ends, up to T = 1.
+#[test]
+fn the_sampled_loop_is_proved_up_to_its_edge() {
+    let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+    for (a, edge) in [(1.0, 3.0_f64.ln()), (0.0, 1.0)] {
+        let spec = PlantSpec::Linear(LinearParameters { a: vec![vec![a]], b: vec![vec![1.0]], c: None });
+        let plant = spec.build().unwrap();
+        for (sample_time_s, expected) in
+            [(edge * (1.0 - 1e-6), Verdict::Proved), (edge * (1.0 + 1e-6), Verdict::Undecided)]
+        {
+            let request = DesignRequest {
+                name: "sampled".into(),
+                method: Method::Lpvqr,
+                weights: CostWeights { q: scalar(1.0), r: scalar(1.0) },
+                grid_points: 1,
+                schedule: ScheduleKind::Grid,
+                limits: InputLimits::none(1),
+                sample_time_s,
+                rate_bounded: None,
+            };
+            let mut design = design(&spec, &*plant, &request, &|_| {}).unwrap();
+            design.controller.schedule = Schedule::Constant { gain: scalar(2.0) };
+            let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
+            assert_eq!(claim(&proofs.claims, "zero-order hold").verdict, expected, "a = {a}, T = {sample_time_s}");
+        }
+    }
+}
+
+/// Ten thousand scalar polytopes with two vertices: model, Y, L, γ, σ and rates at random, every number a multiple of 1/16. What is
+/// proved is true in integers at nine points of the polytope; what is refuted is false at one of them.
+#[test]
+fn polytopes_are_proved_only_if_integers_agree() {
+    let mut numbers = Numbers(5);
+    let mut integer = |size: i128| (numbers.next() * size as f64).round() as i128;
+    let mut counts = std::collections::BTreeMap::new();
+    for case in 0..10_000 {
+        let spread = 1 << (case % 6);
+        let (y0, l0) = (16 + integer(12), 24 + integer(16));
+        let a = [integer(12), integer(12)];
+        let b = [16 + integer(4), 16 + integer(4)];
+        let y = [y0, (y0 + integer(spread)).max(1)];
+        let l = [l0, l0 + integer(spread)];
+        let [nu, q, r, sigma, gamma] =
+            [integer(spread).abs(), 2 + integer(1), 2 + integer(1), 40 + integer(24), 16 + integer(8)];
+        let scalars = |values: [i128; 2]| values.map(|value| Mat::from_fn(1, 1, |_, _| value as f64 / 16.0)).to_vec();
+        let rate = nu as f64 / 16.0;
+        let request = PolytopicClaim {
+            polytope: Polytope::new(scalars(a), scalars(b)).unwrap(),
+            lyapunov: PolytopicLyapunov::ParameterDependent {
+                y: scalars(y),
+                l: scalars(l),
+                rate_vertices: vec![vec![rate, -rate], vec![-rate, rate]],
+            },
+            auxiliary_gain: None,
+            weights: Some(CostWeights { q: scalars([q, q])[0].clone(), r: scalars([r, r])[0].clone() }),
+            saturation: Some(InputBounds { sigma: vec![sigma as f64 / 16.0], gamma: gamma as f64 / 16.0 }),
+        };
+        let at = |k: i128, values: [i128; 2]| k * values[0] + (8 - k) * values[1];
+        // in units of 1/(8·16)² and of its multiples
+        let flow = |k: i128, nu: i128| -2 * (at(k, a) * at(k, y) - at(k, b) * at(k, l)) + 64 * nu * (y[0] - y[1]);
+        let everywhere = |holds: &dyn Fn(i128, i128) -> bool| (0..=8).all(|k| [-nu, nu].iter().all(|&nu| holds(k, nu)));
+        let decreases = everywhere(&|k, nu| flow(k, nu) > 0);
+        let costs = everywhere(&|k, nu| 16 * flow(k, nu) - at(k, y).pow(2) * q - at(k, l).pow(2) * r > 0);
+        let unsaturated = everywhere(&|k, _| sigma * sigma * at(k, y) * 8 > gamma * at(k, l).pow(2));
+        let claims = prove_polytopic(&request);
+        for (words, truth) in [("is invariant", decreases), ("does not saturate", unsaturated), ("at most 1 V", costs)]
+        {
+            // the cost with a factor is another claim
+            let Some(claim) = claims.iter().find(|claim| claim.claim.contains(words)) else { continue };
+            assert!(truth || claim.verdict != Verdict::Proved, "case {case}: {words} is false and proved");
+            assert!(!truth || claim.verdict != Verdict::Refuted, "case {case}: {words} is true and refuted");
+            *counts.entry((words, claim.verdict.word())).or_insert(0) += 1;
+        }
+    }
+    for words in ["is invariant", "does not saturate", "at most 1 V"] {
+        let of = |verdict: &str| counts.get(&(words, verdict)).copied().unwrap_or(0);
+        assert!(of("refuted") > 300 && of("proved") > 300, "{counts:?}: the test tests something");
     }
 }
 

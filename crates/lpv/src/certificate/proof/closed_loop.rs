@@ -188,14 +188,26 @@ impl<'a> ClosedLoop<'a> {
         combine(function, &factors)
     }
 
-    /// The parts of the decrease with the mixture number `mixture`, over `t` of piece `piece`.
-    pub fn parts(&self, piece: usize, mixture: usize, t: Taylor) -> Parts {
+    /// The gain that flies at position `t`, as numbers.
+    pub fn gain(&self, t: f64) -> Mat<f64> {
+        self.schedule.gain_matrix(self.parameter(t))
+    }
+
+    /// A, B and the gain that flies, over `t` of piece `piece`.
+    pub fn model_and_gain(&self, piece: usize, t: Taylor) -> (TaylorMatrix, TaylorMatrix, TaylorMatrix) {
         let rho = self.rho(t);
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let (x, u) = self.plant.trim_over(rho);
         let (a, b) = self.plant.jacobians_over(&x, &u);
-        let (a, b) = (TaylorMatrix::new(n, n, a), TaylorMatrix::new(n, m, b));
-        let k = TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho));
+        let k = self.schedule.gain_on_piece(piece, t, rho);
+        (TaylorMatrix::new(n, n, a), TaylorMatrix::new(n, m, b), TaylorMatrix::new(m, n, k))
+    }
+
+    /// The parts of the decrease with the mixture number `mixture`, over `t` of piece `piece`.
+    pub fn parts(&self, piece: usize, mixture: usize, t: Taylor) -> Parts {
+        let rho = self.rho(t);
+        let (n, m) = (self.weights.q.nrows(), self.inputs());
+        let (a, b, k) = self.model_and_gain(piece, t);
         let CostWeights { q, r } = self.weights;
         let mixed = |k: TaylorMatrix, f: Option<TaylorMatrix>| match f {
             None => k,
@@ -255,17 +267,19 @@ impl<'a> ClosedLoop<'a> {
         let Some((row, bound)) = border else { return matrix };
         let row: Vec<Taylor> = match row {
             Row::Input(i) => {
+                // that row alone
+                let row = |gain: &TaylorMatrix| TaylorMatrix::from_fn(1, n, |_, j| gain.at(i, j));
                 let gain = match &self.auxiliary {
-                    Some(auxiliary) => self.function(auxiliary, rho),
+                    Some(auxiliary) => row(&self.function(auxiliary, rho)),
                     None => {
-                        let k = TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho));
+                        let k = row(&TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho)));
                         match self.form {
                             Form::Direct(_) => k,
                             Form::Inverse(_) => k.times(&matrix),
                         }
                     }
                 };
-                (0..n).map(|j| gain.at(i, j)).collect()
+                (0..n).map(|j| gain.at(0, j)).collect()
             }
             Row::State(i) => match self.form {
                 Form::Direct(_) => (0..n).map(|j| Taylor::from(if i == j { 1.0 } else { 0.0 })).collect(),
@@ -344,7 +358,8 @@ impl Form {
     }
 }
 
-fn combine(function: &MatrixFunction, factors: &[Taylor]) -> TaylorMatrix {
+/// Σ fₖMₖ with the values of the basis functions.
+pub(super) fn combine(function: &MatrixFunction, factors: &[Taylor]) -> TaylorMatrix {
     let (rows, columns) = function.shape();
     TaylorMatrix::from_fn(rows, columns, |i, j| {
         let terms = factors.iter().zip(&function.coefficients).filter(|(_, m)| m[(i, j)] != 0.0);

@@ -114,7 +114,10 @@ pub(super) enum Definiteness {
         value: f64,
     },
     /// Neither: a smaller cell may tell, unless the middle itself is on the edge.
-    Open,
+    Open {
+        /// Half-width of a cell around the same middle that would be proved; 0 if none.
+        fits: f64,
+    },
 }
 
 impl CellMatrix {
@@ -171,32 +174,46 @@ impl CellMatrix {
         let slope = congruence(n, &factor, &self.slope);
         let bend = congruence(n, &factor, &self.bend);
         let half = Interval::point(half);
-        let excess = |i: usize| {
-            (0..n).fold(Interval::point(0.0), |sum, j| {
+        let sums = |i: usize| {
+            (0..n).fold([Interval::point(0.0); 3], |[constant, linear, quadratic], j| {
                 let at = i * n + j;
                 let identity = if i == j { 1.0 } else { 0.0 };
-                let constant = Interval::point((value[at] - identity).magnitude());
-                let linear = half * slope[at].magnitude();
-                let quadratic = half.square() * 0.5 * bend[at].magnitude();
-                sum + constant + linear + quadratic
+                [
+                    constant + Interval::point((value[at] - identity).magnitude()),
+                    linear + Interval::point(slope[at].magnitude()),
+                    quadratic + Interval::point(bend[at].magnitude()) * 0.5,
+                ]
             })
         };
-        let largest = (0..n).map(|i| excess(i).hi()).fold(0.0, f64::max);
-        if largest < 1.0 { Definiteness::Proved((1.0 - largest).next_down()) } else { Definiteness::Open }
+        let sums: Vec<[Interval; 3]> = (0..n).map(sums).collect();
+        let excess = |[constant, linear, quadratic]: &[Interval; 3]| {
+            (*constant + half * *linear + half.square() * *quadratic).hi()
+        };
+        let largest = sums.iter().map(excess).fold(0.0, f64::max);
+        if largest < 1.0 {
+            return Definiteness::Proved((1.0 - largest).next_down());
+        }
+        // c + l h + q h² = 1
+        let fits = |[constant, linear, quadratic]: &[Interval; 3]| {
+            let (left, linear, quadratic) = (1.0 - constant.hi(), linear.hi(), quadratic.hi());
+            2.0 * left / (linear + (linear * linear + 4.0 * quadratic * left.max(0.0)).sqrt())
+        };
+        let fits = sums.iter().map(fits).fold(half.hi(), f64::min);
+        Definiteness::Open { fits: if fits > 0.0 { fits } else { 0.0 } }
     }
 
     /// zᵀM(c)z for the eigenvector z of the smallest eigenvalue, in interval arithmetic.
     fn refutation(&self, middle: &Mat<f64>) -> Definiteness {
         let n = self.n;
         let Some(direction) = smallest_eigenvector(middle).filter(|_| smallest_eigenvalue(middle) < 0.0) else {
-            return Definiteness::Open;
+            return Definiteness::Open { fits: 0.0 };
         };
         let form = (0..n * n).fold(Interval::point(0.0), |sum, at| {
             sum + self.value[at] * (Interval::point(direction[at / n]) * direction[at % n])
         });
         match form.hi() < 0.0 {
             true => Definiteness::Refuted { direction, value: form.hi() },
-            false => Definiteness::Open,
+            false => Definiteness::Open { fits: 0.0 },
         }
     }
 }

@@ -235,8 +235,10 @@ impl Remainder {
     /// Bounds on a cell.
     fn on(&self, place: &Place) -> Difference {
         let part = |t: f64| t * PARTS as f64;
-        let first = part(place.middle - place.half).floor() as usize;
-        let last = (part(place.middle + place.half).ceil() as usize).clamp(first + 1, self.differences.len());
+        // cells overlap a little; a neighbouring piece covers its own
+        let [begin, end] = [place.piece * PARTS, (place.piece + 1) * PARTS];
+        let first = (part(place.middle - place.half).floor() as usize).clamp(begin, end - 1);
+        let last = (part(place.middle + place.half).ceil() as usize).clamp(first + 1, end);
         let rest = &self.differences[first..last];
         rest[1..].iter().fold(rest[0].clone(), Difference::hull)
     }
