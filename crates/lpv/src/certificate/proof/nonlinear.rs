@@ -402,8 +402,14 @@ impl ClosedLoop<'_> {
         };
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let state = Mat::from_fn(n, n, |i, j| {
-            // x − x* has no component of the parameter
-            if Some(j) == bounds.parameter { 0.0 } else { bound(&value.0.at(i, j), &bend.0.at(i, j)) }
+            let bound = bound(&value.0.at(i, j), &bend.0.at(i, j));
+            match bounds.radii[j] {
+                // x − x* has no component of the parameter
+                _ if Some(j) == bounds.parameter => 0.0,
+                // one that the equations do not contain at the operating points must not matter in the box either
+                radius if radius.is_infinite() && bound > 0.0 => f64::INFINITY,
+                _ => bound,
+            }
         });
         let along = Mat::from_fn(n, 2 * m, |i, j| bound(&value.1.at(i, j), &bend.1.at(i, j)));
         // |I − MMᵀ|
