@@ -51,7 +51,7 @@ const TRIM_TOLERANCE: f64 = 1e-12;
 pub struct NonlinearProof {
     /// The set {V ≤ level} is invariant under the saturated controller, and V falls along every motion in it.
     pub level: f64,
-    /// (state, radius): on the set |eᵢ| is at most the radius; components that the equations do not contain are left out.
+    /// (state, radius): on the set |eᵢ| is at most the radius.
     pub radii: Vec<(usize, f64)>,
     /// Largest rate of the parameter on the set.
     pub rate: f64,
@@ -75,8 +75,10 @@ struct Decreases {
 
 /// A box that holds the set.
 struct Bounds {
-    /// Of |eᵢ|: infinite for components that the equations do not contain.
+    /// Of |eᵢ|.
     radii: Vec<f64>,
+    /// Components that the equations do not contain: their reference may have any value.
+    absent: Vec<bool>,
     /// The component that is the parameter: it may have any value, whatever its error.
     parameter: Option<usize>,
     /// Of |uᵢ − u*ᵢ|.
@@ -185,7 +187,7 @@ impl Bounds {
     fn times(&self, factor: f64) -> Self {
         // the product is rounded: a little more than that
         let times = |values: &[f64]| values.iter().map(|value| value * factor * (1.0 + 1e-12)).collect();
-        Self { radii: times(&self.radii), inputs: times(&self.inputs), ..*self }
+        Self { radii: times(&self.radii), inputs: times(&self.inputs), absent: self.absent.clone(), ..*self }
     }
 
     /// The largest level of which the parameter's error is less than half a turn, so that it is not wrapped.
@@ -202,6 +204,9 @@ impl Bounds {
         let around = |(i, (&x, &radius)): (usize, (&Taylor, &f64))| {
             if Some(i) == self.parameter {
                 return x;
+            }
+            if self.absent[i] {
+                return Taylor::constant(Interval::ENTIRE);
             }
             let radius = (Interval::point(radius) * fraction).hi();
             x + Taylor::constant(Interval::new(-radius, radius))
@@ -321,7 +326,6 @@ impl ClosedLoop<'_> {
         }
         let saturates = self.mixtures() > 1;
         let bound = |(row, square): (&Row, &f64)| match *row {
-            Row::State(i) if absent[i] && Some(i) != parameter => f64::INFINITY,
             // the gain that flies is another
             Row::Input(_) if saturates => f64::INFINITY,
             _ => BOX_SLACK * square.sqrt(),
@@ -335,7 +339,7 @@ impl ClosedLoop<'_> {
         let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
         drop(cells);
         let (radii, inputs) = bounds.split_at(n);
-        let bounds = Bounds { radii: radii.to_vec(), parameter, inputs: inputs.to_vec() };
+        let bounds = Bounds { radii: radii.to_vec(), absent, parameter, inputs: inputs.to_vec() };
         matches!(attempt, Attempt::Proved(_)).then_some(bounds)
     }
 
@@ -403,11 +407,11 @@ impl ClosedLoop<'_> {
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let state = Mat::from_fn(n, n, |i, j| {
             let bound = bound(&value.0.at(i, j), &bend.0.at(i, j));
-            match bounds.radii[j] {
+            match bounds.absent[j] {
                 // x − x* has no component of the parameter
                 _ if Some(j) == bounds.parameter => 0.0,
                 // one that the equations do not contain at the operating points must not matter in the box either
-                radius if radius.is_infinite() && bound > 0.0 => f64::INFINITY,
+                true if bound > 0.0 => f64::INFINITY,
                 _ => bound,
             }
         });
