@@ -7,7 +7,7 @@ import { number, percent, seconds } from "./format";
 import type { Selection } from "./selection";
 import type { Theme } from "./theme";
 
-const COLUMNS = ["Controller", "Design", "Guaranteed cost", "Actual cost", "Settling time", "Peak input", "Saturated", "Outcome"] as const;
+const COLUMNS = ["Controller", "Design", "Cost bound", "Actual cost", "Settling time", "Peak input", "Saturated", "Outcome"] as const;
 
 export function comparisonTable(report: Report, selection: Selection, theme: Theme): HTMLElement {
   const unit = report.plant.inputs[0]?.unit ?? "";
@@ -40,7 +40,7 @@ function tableRow(report: Report, run: Run, unit: string, selection: Selection, 
     el("td", { class: "col-show" }, checkbox),
     el("th", { scope: "row", class: "col-name" }, el("div", { class: "run-head" }, letterBadge(report, run, theme), name, lineSample(run, theme)), el("div", { class: "run-sub" }, run.controller)),
     cell("Design", "col-verdict", verdictChip(run.verdict)),
-    cell("Guaranteed cost", "num col-bound", ...guaranteedCost(run)),
+    cell("Cost bound", "num col-bound", ...guaranteedCost(run)),
     cell("Actual cost", "num", ...actualCost(run)),
     cell("Settling time", "num", run.settling_time_s === null ? dash("not settled") : seconds(run.settling_time_s)),
     cell("Peak input", "num", `${number(run.peak_input, 4)} ${unit}`),

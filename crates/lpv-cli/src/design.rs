@@ -4,7 +4,7 @@ use crate::designs::{self, DesignSummary};
 use crate::failure::Failure;
 use crate::folder::{ResultFile, ResultFolder};
 use crate::output::{OutputArguments, print};
-use crate::problem::{ProblemPlan, solve};
+use crate::problem::{ProblemPlan, gain, solve};
 use crate::run::required_verdicts;
 use crate::scenario::{Scenario, read_text};
 use clap::Args;
@@ -23,6 +23,7 @@ pub struct DesignArguments {
 pub fn run(arguments: &DesignArguments) -> Result<(), Failure> {
     let text = read_text(&arguments.file)?;
     match ProblemPlan::is_problem(&text) {
+        true if gain::is_gain(&text) => run_gain(arguments, &text),
         true => run_problem(arguments, &text),
         false => run_scenario(arguments),
     }
@@ -40,6 +41,18 @@ fn run_problem(arguments: &DesignArguments, text: &str) -> Result<(), Failure> {
     }
     print(&if arguments.output.json { json } else { report.text() })?;
     report.failure(&arguments.file).map_or(Ok(()), Err)
+}
+
+/// As [`run_problem`], for a bound on the induced L2 norm.
+fn run_gain(arguments: &DesignArguments, text: &str) -> Result<(), Failure> {
+    let place =
+        arguments.output.out.as_deref().map(|place| ResultFile::begin(place, arguments.output.force)).transpose()?;
+    let report = gain::solve(&arguments.file, text)?;
+    let json = serde_json::to_string_pretty(&report).map_err(|error| Failure::serialisation(&error))?;
+    if let Some(place) = place {
+        place.finish(json.as_bytes())?;
+    }
+    print(&if arguments.output.json { json } else { report.text() })
 }
 
 fn run_scenario(arguments: &DesignArguments) -> Result<(), Failure> {

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::folder::ResultFolder;
 use crate::progress;
 use crate::scenario::{ControllerPlan, Scenario, engineers_words};
-use lpv::certificate::{Claim, ProofOptions, SupervisedProofs, Verdict, check, prove_supervised};
+use lpv::certificate::{Claim, ProofOptions, Proofs, SupervisedProofs, Verdict, check, prove, prove_supervised};
 use lpv::synthesis::{Design, SynthesisError, design_supervised};
 use serde::Serialize;
 use std::time::Instant;
@@ -100,6 +100,25 @@ pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
         finished.push((plan, checked));
     }
     Ok(finished.into_iter().map(|(_, checked)| checked).collect())
+}
+
+/// Prove what can be proved of every design, and add it to its claims; what is only found of a frozen design, and not claimed,
+/// is added where it is proved. `None` where nothing can be proved of a design.
+pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign]) -> Vec<Option<Proofs>> {
+    let bar = progress::bar("prove", checked.len());
+    let prove_one = |checked: &mut CheckedDesign| {
+        let proofs = prove(&checked.design, &*scenario.plant, &ProofOptions::default()).ok();
+        bar.inc(1);
+        let told = |proofs: &Proofs| {
+            let is_told = |claim: &&Claim| proofs.asked || claim.verdict == Verdict::Proved;
+            proofs.claims.iter().filter(is_told).cloned().collect::<Vec<Claim>>()
+        };
+        checked.claims.extend(proofs.iter().flat_map(told));
+        proofs
+    };
+    let proofs = checked.iter_mut().map(prove_one).collect();
+    bar.finish_and_clear();
+    proofs
 }
 
 fn same_but_name(a: &ControllerPlan, b: &ControllerPlan) -> bool {

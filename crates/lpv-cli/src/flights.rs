@@ -2,12 +2,18 @@
 
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::{StepStay, step_stays};
-use lpv::certificate::{Claim, StepBound, StepConditions, SupervisedProofs, UnmetCondition, step_bound};
+use lpv::certificate::{
+    Claim, Excursion, Proofs, StepBound, StepConditions, SupervisedProofs, UnmetCondition, Verdict, excursion,
+    lyapunov_value, step_bound,
+};
 use lpv::model::linearize;
-use lpv::sim::{Flight, Performance, Simulation, StepResponse, performance};
+use lpv::sim::{Flight, Performance, Simulation, StepResponse, Trajectory, performance};
 use lpv::synthesis::{Design, covering_level};
 use rayon::prelude::*;
 use std::time::Instant;
+
+/// Time between the samples at which it is looked whether a flight is beyond what its bound is for.
+const EXCURSION_STEP_S: f64 = 0.01;
 
 /// A flown controller.
 pub struct Flown {
@@ -15,8 +21,8 @@ pub struct Flown {
     pub flight: Flight,
     /// Its figures of merit.
     pub performance: Performance,
-    /// What the design guarantees for each step that was reached; empty below a governor, whose steps have no bound on their
-    /// cost.
+    /// What the design says of each step that was reached: a guarantee only where its verdict is `proved`; empty below a
+    /// governor, whose steps have no bound on their cost.
     pub bounds: Vec<StepBound>,
     /// Whether each step stayed in the certified sets; empty of a controller that does not watch them.
     pub stays: Vec<StepStay>,
@@ -70,7 +76,7 @@ fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design, proofs: Opti
     let is_governed = !flight.trajectory.governed.is_empty();
     let (bounds, mut claims) = match is_governed {
         true => (Vec::new(), Vec::new()),
-        false => step_bounds(scenario, plan, design, &performance),
+        false => step_bounds(scenario, plan, design, &performance, &flight.trajectory),
     };
     let stays = step_stays(scenario, plan, design, proofs, &flight, &performance);
     claims.extend(stays.iter().map(|stay| stay.claim.clone()));
@@ -83,6 +89,7 @@ fn step_bounds(
     plan: &ControllerPlan,
     design: &Design,
     performance: &Performance,
+    trajectory: &Trajectory,
 ) -> (Vec<StepBound>, Vec<Claim>) {
     let scheduling = scenario.plant.description().scheduling.as_ref();
     let bound = |(k, step): (usize, &StepResponse)| {
@@ -113,15 +120,98 @@ fn step_bounds(
             }
             UnmetCondition::Noise => Some("; noise acts, of which the bound knows nothing".into()),
         });
+        let end = performance.steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
+        let beyond = excursions(scenario, design, trajectory, [step.time_s, end], bound.level);
         let claim = Claim::checked(
             format!("step {} at t = {} s costs at most {}", k + 1, step.time_s, digits(bound.bound)),
             bound.verdict(),
             bound.level.map_or(f64::INFINITY, |level| level - bound.bound),
-            inside + &others.collect::<String>(),
+            inside + &others.collect::<String>() + &beyond,
         );
         (bound, claim)
     };
     performance.steps.iter().enumerate().map(bound).unzip()
+}
+
+/// When and for how long a step was outside the set of this level, and faster than the rate of the design (a frozen design is
+/// for a parameter at rest, and of that the claim speaks already).
+fn excursions(
+    scenario: &Scenario,
+    design: &Design,
+    trajectory: &Trajectory,
+    [begin, end]: [f64; 2],
+    level: Option<f64>,
+) -> String {
+    let description = scenario.plant.description();
+    let scheduling = description.scheduling.as_ref();
+    let within: Vec<usize> = (0..trajectory.time_s.len())
+        .filter(|&k| (begin..end).contains(&trajectory.time_s[k]))
+        .step_by(((EXCURSION_STEP_S / scenario.sample_time_s) as usize).max(1))
+        .collect();
+    let times: Vec<f64> = within.iter().map(|&k| trajectory.time_s[k]).collect();
+    let spell = |what: String, beyond: Option<Excursion>| match beyond {
+        None => String::new(),
+        Some(beyond) => {
+            format!("; {what} for {:.2} s between t = {:.2} s and {:.2} s", beyond.total_s, beyond.from_s, beyond.to_s)
+        }
+    };
+    let outside = level.and_then(|level| {
+        excursion(&times, |at| {
+            let (x, reference) = (&trajectory.states[within[at]], &trajectory.references[within[at]]);
+            let mut error = vec![0.0; x.len()];
+            description.state_error(x, reference, &mut error);
+            let rho = scheduling.map_or(0.0, |scheduling| x[scheduling.state]);
+            // rounding at the start of a step is no excursion
+            lyapunov_value(design, scheduling, rho, &error) > level * (1.0 + 1e-9)
+        })
+    });
+    let mut text = spell("outside the set".into(), outside);
+    if let (Some(bounded), Some(scheduling)) = (&design.rate_bounded, scheduling) {
+        let faster = faster_than(scenario, trajectory, &within, bounded.rate);
+        text += &spell(format!("faster than {} {}/s", bounded.rate, scheduling.unit), faster);
+    }
+    text
+}
+
+/// When the parameter moved faster than `rate`, over the samples `within`.
+fn faster_than(scenario: &Scenario, trajectory: &Trajectory, within: &[usize], rate: f64) -> Option<Excursion> {
+    let state = scenario.plant.description().scheduling.as_ref()?.state;
+    let times: Vec<f64> = within.iter().map(|&k| trajectory.time_s[k]).collect();
+    excursion(&times, |at| {
+        let k = within[at];
+        let Some(next) = trajectory.time_s.get(k + 1) else { return false };
+        let step = trajectory.states[k + 1][state] - trajectory.states[k][state];
+        (step / (next - trajectory.time_s[k])).abs() > rate
+    })
+}
+
+/// Compare the rate that is proved with the one that the flight had.
+pub fn compare_with_proofs(scenario: &Scenario, flown: &mut Flown, proofs: &Proofs) {
+    let Some(scheduling) = &scenario.plant.description().scheduling else { return };
+    let (parameter, unit) = (&scheduling.parameter, &scheduling.unit);
+    let trajectory = &flown.flight.trajectory;
+    let stride = ((EXCURSION_STEP_S / scenario.sample_time_s) as usize).max(1);
+    let all: Vec<usize> = (0..trajectory.time_s.len()).step_by(stride).collect();
+    let peak = flown.performance.steps.iter().map(|step| step.peak_parameter_rate).fold(0.0, f64::max);
+    let claim = format!("{parameter} keeps to the rate for which V is proved to decrease");
+    let (verdict, margin, detail) = match proofs.stable_up_to {
+        None => (Verdict::Undecided, f64::NAN, format!("none is proved; it moved at up to {peak:.4} {unit}/s")),
+        Some(rate) => {
+            let proved = format!("proved for |d{parameter}/dt| <= {rate:.4} {unit}/s, flown up to {peak:.4} {unit}/s");
+            match faster_than(scenario, trajectory, &all, rate) {
+                None => (Verdict::Numerical, rate - peak, proved),
+                Some(beyond) => (
+                    Verdict::Undecided,
+                    rate - peak,
+                    format!(
+                        "{proved}: faster for {:.2} s between t = {:.2} s and {:.2} s, where nothing is proved",
+                        beyond.total_s, beyond.from_s, beyond.to_s
+                    ),
+                ),
+            }
+        }
+    };
+    flown.claims.push(Claim::checked(claim, verdict, margin, detail));
 }
 
 /// Which γ would cover the step. It is advice: a trial design that fails takes nothing from the flight.

@@ -29,7 +29,7 @@ use clap::{Parser, Subcommand};
 use std::io::Write;
 use std::process::ExitCode;
 
-/// Gain-scheduled control of nonlinear plants with saturating actuators, with a guarantee that is checked.
+/// Gain-scheduled control of nonlinear plants with saturating actuators, with bounds that say how far they are proved.
 ///
 /// Exit codes: 0 done and certified as asked; 2 bad input; 3 infeasible; 4 not certified or undecided; 1 a defect of lpv.
 #[derive(Parser)]

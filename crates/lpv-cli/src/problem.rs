@@ -2,6 +2,7 @@
 //! Everything that can be wrong with a file is met here.
 
 mod file;
+pub mod gain;
 mod solve;
 
 use crate::failure::Failure;

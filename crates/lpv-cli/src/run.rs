@@ -18,6 +18,9 @@ use std::time::Instant;
 pub struct RunArguments {
     /// Scenario file
     scenario: PathBuf,
+    /// Also prove the designs over the whole range of the parameter, and compare the proved rates with the flown ones
+    #[arg(long)]
+    prove: bool,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -27,9 +30,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let scenario = Scenario::read(&arguments.scenario)?;
     let folder = ResultFolder::begin(&scenario.result_folder(arguments.output.out.as_deref()), arguments.output.force)?;
-    let checked = designs::design_all(&scenario)?;
+    let mut checked = designs::design_all(&scenario)?;
+    let proofs = if arguments.prove { designs::prove_all(&scenario, &mut checked) } else { Vec::new() };
     let certified: Vec<_> = checked.iter().map(|checked| (&checked.design, checked.proofs.as_ref())).collect();
-    let flown = flights::fly_all(&scenario, &certified);
+    let mut flown = flights::fly_all(&scenario, &certified);
+    for (flown, proofs) in flown.iter_mut().zip(&proofs) {
+        if let Some(proofs) = proofs {
+            flights::compare_with_proofs(&scenario, flown, proofs);
+        }
+    }
 
     designs::write_all(&scenario, &checked, &folder)?;
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {

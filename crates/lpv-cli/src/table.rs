@@ -7,16 +7,8 @@ use crate::report::bound_note;
 use crate::scenario::Scenario;
 use lpv::sim::Outcome;
 
-const HEADER: [&str; 8] = [
-    "controller",
-    "design",
-    "guaranteed cost (verdict)",
-    "actual cost",
-    "settling",
-    "peak input",
-    "saturated",
-    "flight",
-];
+const HEADER: [&str; 8] =
+    ["controller", "design", "cost bound (verdict)", "actual cost", "settling", "peak input", "saturated", "flight"];
 
 /// All controllers side by side.
 pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> String {

@@ -25,6 +25,20 @@ pub struct Report {
     objective: Option<f64>,
     /// What `objective` is.
     objective_is: &'static str,
+    /// How the Lyapunov function depends on the parameter.
+    lyapunov: &'static str,
+    /// What the design was made for: with it `lpv certify` needs no other file.
+    model: ModelMatrices,
+    /// Fingerprint of the model.
+    model_hash: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    weights: Option<WeightMatrices>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sigma: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gamma: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_vertices: Option<Vec<Vec<f64>>>,
     /// Vertices or grid points, in the order of the matrices.
     places: Vec<String>,
     #[serde(rename = "Y")]
@@ -42,6 +56,7 @@ pub struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     s: Option<Vec<f64>>,
     /// x(0)ᵀP(ρ(0))x(0).
+    /// The thesis's word: a guarantee only where the verdict is `proved`.
     guaranteed_cost: Option<f64>,
     /// Whether x(0) is in the certified set.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -60,6 +75,23 @@ pub struct Report {
     /// The place that the status, witness and explanation are of, if it is one of several.
     #[serde(skip_serializing_if = "Option::is_none")]
     place: Option<String>,
+}
+
+/// A and B at each vertex or point.
+#[derive(Serialize)]
+struct ModelMatrices {
+    #[serde(rename = "A")]
+    a: Vec<Rows>,
+    #[serde(rename = "B")]
+    b: Vec<Rows>,
+}
+
+#[derive(Serialize)]
+struct WeightMatrices {
+    #[serde(rename = "Q")]
+    q: Rows,
+    #[serde(rename = "R")]
+    r: Rows,
 }
 
 /// Z of one block of the witness.
@@ -155,6 +187,23 @@ fn report(plan: &ProblemPlan, designs: &[PolytopicDesign], guaranteed: Option<f6
     Report {
         status: status(&designs[worst].answer.outcome),
         convention: "u = -K x",
+        lyapunov: match &plan.scope {
+            Scope::Frozen => "frozen",
+            Scope::Polytope(Lyapunov::Common) => "common",
+            Scope::Polytope(Lyapunov::ParameterDependent { .. }) => "parameter-dependent",
+        },
+        model: ModelMatrices {
+            a: plan.models.iter().map(|model| to_rows(&model.a)).collect(),
+            b: plan.models.iter().map(|model| to_rows(&model.b)).collect(),
+        },
+        model_hash: Polytope::hull(&plan.models).fingerprint(),
+        weights: plan.weights.as_ref().map(|weights| WeightMatrices { q: to_rows(&weights.q), r: to_rows(&weights.r) }),
+        sigma: plan.saturation.as_ref().map(|bounds| bounds.sigma.clone()),
+        gamma: plan.saturation.as_ref().map(|bounds| bounds.gamma),
+        rate_vertices: match &plan.scope {
+            Scope::Polytope(Lyapunov::ParameterDependent { rate_vertices }) => Some(rate_vertices.clone()),
+            _ => None,
+        },
         objective: solutions.as_ref().and(objective),
         objective_is,
         places: plan.places.clone(),
@@ -206,18 +255,18 @@ fn objective(plan: &ProblemPlan, designs: &[PolytopicDesign]) -> (Option<f64>, &
 fn verdict(plan: &ProblemPlan, answer: &Answer, inside: Option<bool>) -> (Verdict, String) {
     match (&answer.outcome, &plan.scope, inside) {
         (Outcome::Solved, _, Some(false)) => {
-            (Verdict::Undecided, "the initial state is outside the certified set: x(0)'P x(0) > gamma, and nothing is guaranteed from there".into())
+            (Verdict::Undecided, "the initial state is outside the certified set: x(0)'P x(0) > gamma, and nothing is claimed from there".into())
         }
         (Outcome::Solved, Scope::Frozen, _) if plan.models.len() > 1 => (
             Verdict::Undecided,
-            "frozen design: the inequalities hold at each point for a parameter at rest; nothing is guaranteed once it moves".into(),
+            "frozen design: the inequalities hold at each point for a parameter at rest; nothing is claimed once it moves".into(),
         ),
         (Outcome::Solved, Scope::Polytope(Lyapunov::ParameterDependent { .. }), _) => (
             Verdict::Numerical,
-            "verified for Y and L at all vertices, for every parameter in the polytope with a rate in the hull of the rate vertices; K is rounded".into(),
+            "verified for Y and L at all vertices, for every parameter in the polytope with a rate in the hull of the rate vertices; K is rounded; lpv certify proves the file of -o".into(),
         ),
         (Outcome::Solved, _, _) => {
-            (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope; K is rounded".into())
+            (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope; K is rounded; lpv certify proves the file of -o".into())
         }
         (Outcome::Inaccurate(reason), _, _) => {
             (Verdict::Undecided, format!("the solver stopped short: {reason}"))
@@ -260,7 +309,7 @@ impl Report {
             line("s", s.iter().map(|s| format!("{s:.6}")).collect::<Vec<_>>().join(", "));
         }
         if let Some(cost) = self.guaranteed_cost {
-            line("guaranteed cost", format!("{cost:.6}  ({})", self.verdict.word()));
+            line("cost bound", format!("{cost:.6}  ({})", self.verdict.word()));
         }
         if let Some((name, margin)) =
             self.residuals.0.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| self.k.is_some())

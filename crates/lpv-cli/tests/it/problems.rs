@@ -140,3 +140,67 @@ fn bad_input() {
         assert_eq!((&*ended.out, place.list(".")), ("", vec!["scenario.toml".to_owned()]));
     }
 }
+
+/// What `lpv design` prints is certified over the whole polytope, from its numbers alone.
+#[test]
+fn designs_over_polytopes_are_proved() {
+    for problem in [PENDULUM, DOUBLE_INTEGRATOR] {
+        let place = Place::with(problem);
+        place.succeed("design scenario.toml -o design.json");
+        let certificate: Value = serde_json::from_str(&place.succeed("certify design.json --json")).unwrap();
+        let claims = certificate["claims"].as_array().unwrap();
+        assert!(claims.len() >= 3 && claims.iter().all(|claim| claim["verdict"] == "proved"), "{claims:?}");
+        let text = fs::read_to_string(place.path("design.json")).unwrap();
+        let mut design: Value = serde_json::from_str(&text).unwrap();
+        design["model"]["A"][0][1][0] = 1.5.into();
+        place.write("edited.json", design.to_string());
+        place.lpv("certify edited.json").refuses(2, &["model_hash", "another model"]);
+    }
+}
+
+/// K and P from elsewhere, with nothing but the model: proved, refuted with a witness, or refused with the reason.
+#[test]
+fn gains_from_elsewhere_are_certified() {
+    let place = Place::with("");
+    let file = |k: &str, p: &str| {
+        format!(
+            r#"{{"model": {{"A": [[[0, 1], [1, -0.1]], [[0, 1], [0, -0.1]]], "B": [[0], [1]]}}, "K": {k}, "P": {p}}}"#
+        )
+    };
+    place.write("design.json", file("[[3, 3]]", "[[4, 1], [1, 1]]"));
+    let text = place.succeed("certify design.json");
+    assert!(text.contains("proved: V decreases for every motion of the parameter in the polytope"), "{text}");
+    place.write("design.json", file("[[0.5, 3]]", "[[4, 1], [1, 1]]"));
+    let ended = place.lpv("certify design.json --json");
+    ended.refuses(4, &["refuted"]);
+    let certificate: Value = serde_json::from_str(&ended.out).unwrap();
+    assert_eq!(certificate["claims"][1]["witness"]["vertex_weights"], serde_json::json!([1.0, 0.0]));
+    for (k, p, words) in [
+        ("[[3, 3, 1]]", "[[4, 1], [1, 1]]", "1 × 2"),
+        ("[[3, 3]]", "[[4, 1], [2, 1]]", "symmetric"),
+        ("[[3, 3]]", "[[[4, 1], [1, 1]], [[4, 1], [1, 2]]]", "differs between vertices"),
+    ] {
+        place.write("design.json", file(k, p));
+        place.lpv("certify design.json").refuses(2, &["design.json", words]);
+    }
+    place.write("design.json", file("[[3, 3]]", "[[4, 1], [1, 1]]"));
+    place.lpv("certify design.json --rate 1").refuses(2, &["--rate", "rate_vertices"]);
+}
+
+/// The commutator benchmark of LPVTools with a cubic P on ten grid points.
+#[test]
+fn the_commutator_has_its_induced_norm() {
+    const COMMUTATOR: &str = include_str!("../../../../problems/commutator.toml");
+    for (rate, expected) in
+        [(Some("0.01"), 0.0100), (Some("0.1"), 0.0993), (Some("1.0"), 0.6624), (Some("4"), 0.8663), (None, 1.0)]
+    {
+        let line = rate.map_or(String::new(), |rate| format!("rate_bound = {rate}"));
+        let text = edited(COMMUTATOR, "rate_bound = 1.0", &line);
+        let answer = answer(&text);
+        close(&answer["gain"], expected, 1e-4);
+        assert_eq!(answer["verdict"], "proved", "{answer}");
+    }
+    Place::with(edited(COMMUTATOR, "range = [-1, 1]", "range = [1, -1]"))
+        .lpv("design scenario.toml")
+        .refuses(2, &["model.range", "ascend"]);
+}

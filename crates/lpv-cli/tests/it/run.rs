@@ -73,7 +73,7 @@ fn writes_a_whole_result() {
     );
     for word in [
         "controller",
-        "guaranteed cost (verdict)",
+        "cost bound (verdict)",
         "actual cost",
         "settling",
         "peak input",
@@ -389,4 +389,19 @@ fn shipped_scenarios_run() {
         count += 1;
     }
     assert!(count >= 2);
+}
+
+/// With `--prove` the claims of the proofs stand beside the others, and the flown rate beside the proved one.
+#[test]
+fn a_run_proves_what_it_flies() {
+    let place = Place::with(QUADROTOR);
+    place.succeed("run scenario.toml --prove");
+    let record = place.json("out/hop/run.json");
+    for run in record["controllers"].as_array().unwrap() {
+        let claims = run["design_claims"].as_array().unwrap();
+        assert!(claims.iter().any(|claim| claim["verdict"] == "proved"), "{claims:?}");
+        let flown = run["flight_claims"].as_array().unwrap();
+        let rate = flown.iter().find(|claim| claim["claim"].as_str().unwrap().contains("keeps to the rate")).unwrap();
+        assert!(rate["detail"].as_str().unwrap().contains("rad/s"), "{rate}");
+    }
 }

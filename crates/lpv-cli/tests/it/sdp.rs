@@ -33,7 +33,7 @@ fn problems_without_optimum_end_with_3() {
     let ended = place.lpv("sdp infeasible.dat-s");
     ended.refuses(3, &["infeasible"]);
     // Each side has to give way by 1/2.
-    let record: serde_json::Value = serde_json::from_str(&place.lpv("sdp infeasible.dat-s --json").stdout).unwrap();
+    let record: serde_json::Value = serde_json::from_str(&place.lpv("sdp infeasible.dat-s --json").out).unwrap();
     assert!((record["explanation"]["distance"].as_f64().unwrap() - 0.5).abs() < 1e-6);
     place.write("unbounded.dat-s", "1\n1\n1\n-1\n1 1 1 1 1\n");
     place.lpv("sdp unbounded.dat-s --json").refuses(3, &["unbounded"]);

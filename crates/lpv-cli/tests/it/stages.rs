@@ -56,7 +56,6 @@ fn certify_checks_every_saved_design() {
             let text = place.succeed(&format!("certify designs/{file}"));
             assert!(text.contains(": numerical\n"), "{text}");
             let certificate = parsed(&place.succeed(&format!("certify designs/{file} --json")));
-            assert_eq!(certificate["verdict"], "numerical");
             let claims = certificate["claims"].as_array().unwrap();
             assert!(
                 claims.iter().all(|claim| claim["verdict"] == "undecided" || claim["margin"].as_f64().unwrap() > 0.0)
@@ -110,7 +109,9 @@ fn a_negated_gain_is_refuted() {
             ended.refuses(4, &["refuted"]);
             assert!(ended.out.contains("  refuted: "), "{}", ended.out);
             let ended = place.lpv("certify edited.json --json");
-            assert_eq!((ended.code, &parsed(&ended.out)["verdict"]), (4, &"refuted".into()));
+            let certificate = parsed(&ended.out);
+            assert_eq!((ended.code, certificate.as_object().unwrap().len()), (4, 1));
+            assert!(certificate["claims"].as_array().unwrap().iter().any(|claim| claim["verdict"] == "refuted"));
         }
     }
 }
@@ -155,14 +156,17 @@ fn the_printed_gain_of_the_thesis_is_refuted() {
     let stability = claims.iter().find(|claim| claim["claim"] == "frozen closed loop is stable").unwrap();
     assert_eq!(stability["verdict"], "refuted");
     assert!((stability["margin"].as_f64().unwrap() + 3.263).abs() < 1e-3);
-    assert!(stability["detail"].as_str().unwrap().contains("psi = 0.0000"));
-    for key in ["claim", "verdict", "margin", "cells", "seconds"] {
-        assert!(claims.iter().all(|claim| claim.get(key).is_some()), "{key}");
+    assert_eq!(stability["witness"]["parameter"], 0.0);
+    for claim in claims {
+        let keys: Vec<&String> = claim.as_object().unwrap().keys().collect();
+        assert_eq!(keys, ["cells", "claim", "margin", "seconds", "verdict", "witness"]);
     }
     // at rest it is refuted by a proof with a witness
     let ended = place.lpv("certify printed.json --rate 0 --json");
     let certificate = parsed(&ended.out);
-    let refuted = |claim: &&Value| claim["verdict"] == "refuted" && claim.get("witness").is_some();
+    let refuted = |claim: &&Value| {
+        claim["verdict"] == "refuted" && claim["witness"]["state"].as_array().is_some_and(|state| !state.is_empty())
+    };
     let claim = certificate["claims"].as_array().unwrap().iter().find(refuted).unwrap();
     assert_eq!(claim["witness"]["state"].as_array().unwrap().len(), 12);
     place.lpv("certify printed.json --rate=-1").refuses(2, &["--rate", "zero or more"]);

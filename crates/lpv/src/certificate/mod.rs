@@ -11,8 +11,13 @@ mod stability;
 mod supervised;
 
 pub use inequality::{BlockMargin, block_margins};
-pub use proof::{COST_INFLATION, MotionProof, ProofOptions, Proofs, Unprovable, lyapunov_matrix, prove};
-pub use region::{StepBound, StepConditions, UnmetCondition, step_bound, unsaturated_level};
+pub use proof::{
+    COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Unprovable,
+    lyapunov_matrix, prove, prove_gain, prove_polytopic,
+};
+pub use region::{
+    Excursion, StepBound, StepConditions, UnmetCondition, excursion, lyapunov_value, step_bound, unsaturated_level,
+};
 pub use stability::{StabilityMargin, frozen_stability};
 pub use supervised::{SupervisedProofs, prove_supervised};
 
@@ -78,12 +83,18 @@ impl Claim {
 
 /// A motion that breaks a claim: at this parameter and rate the quadratic form of the claim is on the wrong side of zero
 /// along `state`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Witness {
     /// ρ
     pub parameter: f64,
     /// ρ̇
     pub rate: f64,
+    /// ρ as convex weights of the vertices, over a polytope.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vertex_weights: Vec<f64>,
+    /// ρ̇ of these weights.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub vertex_rates: Vec<f64>,
     /// The direction in state space (of a bordered matrix, with the border first).
     pub state: Vec<f64>,
     /// Proved bound on the form, which is negative where the claim asks for positive.
@@ -111,18 +122,23 @@ pub fn check(design: &Design, plant: &dyn Plant) -> Vec<Claim> {
     let verdict = |margin: f64| {
         if margin > 0.0 { Verdict::Numerical } else { Verdict::Refuted }
     };
-    claims.push(Claim::checked(
+    let witness = |margin: f64, parameter: f64| {
+        (verdict(margin) == Verdict::Refuted).then(|| Witness { parameter, value: margin, ..Witness::default() })
+    };
+    let frozen = Claim::checked(
         "frozen closed loop is stable",
         verdict(-stability.abscissa),
         -stability.abscissa,
         format!("max Re λ = {:.4} 1/s {}, {count} parameter values", stability.abscissa, at(stability.abscissa_at)),
-    ));
-    claims.push(Claim::checked(
+    );
+    claims.push(Claim { witness: witness(-stability.abscissa, stability.abscissa_at), ..frozen });
+    let sampled = Claim::checked(
         format!("sampled closed loop is stable at T = {} s", design.sample_time_s),
         verdict(1.0 - stability.radius),
         1.0 - stability.radius,
         format!("max |λ| = {:.6} {}, {count} parameter values", stability.radius, at(stability.radius_at)),
-    ));
+    );
+    claims.push(Claim { witness: witness(1.0 - stability.radius, stability.radius_at), ..sampled });
     claims
 }
 

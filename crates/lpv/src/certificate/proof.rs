@@ -10,18 +10,25 @@
 //! and what is not.
 
 mod closed_loop;
+mod gain;
 mod matrix;
 mod motion;
+mod nonlinear;
+mod polytopic;
+mod sampled;
 
 pub use closed_loop::Unprovable;
+pub use gain::prove_gain;
 pub use motion::MotionProof;
 pub(super) use motion::prove_motion;
+pub use nonlinear::NonlinearProof;
+pub use polytopic::{PolytopicClaim, PolytopicLyapunov, prove_polytopic};
 
 use super::{Claim, Verdict, Witness};
 use crate::math::interval::Interval;
 use crate::plant::Plant;
 use crate::synthesis::Design;
-use closed_loop::{ClosedLoop, Decrease, Place};
+use closed_loop::{ClosedLoop, Decrease, Place, Row};
 use matrix::{CellMatrix, Definiteness};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -30,8 +37,11 @@ use std::time::Instant;
 /// largest rate is sought.
 const LEAST_HALF: f64 = 1.0 / 2048.0;
 const LEAST_HALF_OF_SEARCH: f64 = 1.0 / 1024.0;
-/// Halvings after which a cell takes the second derivatives of the one that it is part of.
-const OWN_DERIVATIVES: usize = 99;
+/// Parts that an open cell is cut into at most, and what their number is multiplied by.
+const MOST_PARTS: f64 = 8.0;
+const FEWER: f64 = 0.95;
+/// Cells reach over their ends by this, in pieces: far more than the rounding of their ends, which lie below 2^14.
+const OVERLAP: f64 = 1e-10;
 /// What the level of the certified set is multiplied by until it is proved: between grid points a little is lost.
 const LEVELS: [f64; 5] = [1.0, 0.999, 0.995, 0.98, 0.9];
 /// By this factor the cost bound of a frozen design may be exceeded when it is proved for a moving parameter.
@@ -46,13 +56,11 @@ const RATES: [f64; 2] = [1e-4, 1e5];
 /// A cell of the range of the parameter.
 struct Cell<M> {
     place: Place,
-    /// How often the piece was halved.
-    depth: usize,
     matrix: M,
 }
 
-/// How a matrix is enclosed on a place, within the matrix of an outer cell if there is one.
-type Enclose<'a, M> = Box<dyn Fn(&Place, Option<&M>) -> M + Sync + 'a>;
+/// How a matrix is enclosed on a place.
+type Enclose<'a, M> = Box<dyn Fn(&Place) -> M + Sync + 'a>;
 
 /// What is known of a cell's claims from its matrix and half-width, each with the rate that it is for.
 type Judgement<'j, M> = dyn Fn(&M, f64) -> Vec<(f64, Definiteness)> + Sync + 'j;
@@ -86,12 +94,12 @@ fn worse(a: Attempt, b: Attempt) -> Attempt {
 }
 
 impl<'a, M: Send + Sync> Cells<'a, M> {
-    fn new(pieces: usize, variants: usize, enclose: impl Fn(&Place, Option<&M>) -> M + Sync + 'a) -> Self {
+    fn new(pieces: usize, variants: usize, enclose: impl Fn(&Place) -> M + Sync + 'a) -> Self {
         let groups: Vec<(usize, usize)> =
             (0..pieces).flat_map(|piece| (0..variants).map(move |v| (piece, v))).collect();
         let first = |&(piece, variant): &(usize, usize)| {
             let place = Place { piece, variant, middle: piece as f64 + 0.5, half: 0.5 };
-            vec![Cell { place, depth: 0, matrix: enclose(&place, None) }]
+            vec![Cell { place, matrix: enclose(&place) }]
         };
         Self { groups: groups.par_iter().map(first).collect(), enclose: Box::new(enclose) }
     }
@@ -114,31 +122,36 @@ impl<'a, M: Send + Sync> Cells<'a, M> {
                     cells.push(cell);
                     continue;
                 }
-                let mut open = false;
+                let mut open: Option<f64> = None;
                 for (rate, definiteness) in claims(&cell.matrix, half) {
                     match definiteness {
                         Definiteness::Proved(found) => margin = margin.min(found),
                         Definiteness::Refuted { direction, value } => {
                             outcome = Some(Attempt::Refuted { t: middle, rate, direction, value });
                         }
-                        Definiteness::Open => open = true,
+                        Definiteness::Open { fits } => open = Some(open.map_or(fits, |other| other.min(fits))),
                     }
                 }
-                if !open || outcome.is_some() {
+                let Some(fits) = open.filter(|_| outcome.is_none()) else {
                     cells.push(cell);
                     continue;
-                }
+                };
                 if 0.5 * half < least {
                     outcome = Some(Attempt::Open { t: middle, half });
                     cells.push(cell);
                     continue;
                 }
-                let (half, depth) = (0.5 * half, cell.depth + 1);
-                let outer = (depth > OWN_DERIVATIVES).then_some(&cell.matrix);
+                // at once into as many as will do; bounds on a smaller cell are tighter, hence a little fewer
+                let wanted = if fits > 0.0 { (FEWER * half / fits).ceil() } else { 2.0 };
+                let parts = wanted.clamp(2.0, MOST_PARTS).min((half / least).floor());
+                // a little wider than their share, so that rounding leaves no gap
+                let (share, parts) = (half / parts, parts as usize);
+                let half = share + OVERLAP;
                 // the left one is next
-                for middle in [middle + half, middle - half] {
+                for part in (0..parts).rev() {
+                    let middle = middle + share * (2 * part + 1) as f64 - share * parts as f64;
                     let place = Place { middle, half, ..cell.place };
-                    left.push(Cell { place, depth, matrix: enclose(&place, outer) });
+                    left.push(Cell { place, matrix: enclose(&place) });
                 }
             }
             outcome.unwrap_or(Attempt::Proved(margin))
@@ -154,6 +167,8 @@ pub struct ProofOptions {
     pub rate: Option<f64>,
     /// Level of the set {V ≤ γ}; `None`: the design's.
     pub level: Option<f64>,
+    /// Also look for the largest set that is invariant for the nonlinear plant.
+    pub nonlinear: bool,
 }
 
 /// What is proved of a design: its claims, and the conditions under which its cost bounds hold.
@@ -171,6 +186,8 @@ pub struct Proofs {
     pub cost_factor: f64,
     /// Level of the set that the saturated methods are certified on; `None` where inputs are not limited.
     pub level: Option<f64>,
+    /// What is proved of the nonlinear plant, if it was asked for and anything is.
+    pub nonlinear: Option<NonlinearProof>,
 }
 
 /// Prove what can be proved of `design`, for the plant that it names:
@@ -179,7 +196,9 @@ pub struct Proofs {
 /// 2. of the saturated methods: on {V ≤ γ} the low gain (K, or F of high gain) does not saturate;
 /// 3. V falls along every motion of the LPV model with |ρ̇| ≤ r, under every mixture of saturated rows, so that {V ≤ γ} is
 ///    invariant;
-/// 4. the cost is at most V(x(0)) times a factor for |ρ̇| ≤ r.
+/// 4. the cost is at most V(x(0)) times a factor for |ρ̇| ≤ r;
+/// 5. the loop with zero-order hold at the design's sample time is stable at every fixed ρ, while no input saturates;
+/// 6. where it is asked for, the largest set {V ≤ c} that is invariant for the nonlinear plant.
 pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Result<Proofs, Unprovable> {
     let closed_loop = ClosedLoop::new(design, plant)?;
     let parameter = plant.description().scheduling.as_ref();
@@ -189,9 +208,11 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         unit: parameter.map_or(String::new(), |s| format!("{}/s", s.unit)),
     };
     let mut claims = vec![definite(&closed_loop, &words)];
-    let gamma = options.level.or(design.method.gamma());
     let mut level = None;
     let sigma = design.controller.limits.symmetric_bound(&design.controller.operating_input);
+    // a method that knows no saturation is good for the set on which there is none
+    let unsaturated_level = || sigma.as_ref().map(|sigma| closed_loop.unsaturated_level(sigma));
+    let gamma = options.level.or(design.method.gamma()).or_else(unsaturated_level);
     if let (Some(gamma), Some(sigma)) = (gamma, &sigma) {
         let (claim, proved_level) = unsaturated(&closed_loop, &words, sigma, gamma);
         claims.push(claim);
@@ -199,8 +220,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
     }
 
     let started = Instant::now();
-    let mut cells =
-        Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place, outer| closed_loop.decrease(place, outer));
+    let mut cells = Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place| closed_loop.decrease(place));
     let own = design.rate_bounded.as_ref().map(|bounded| bounded.rate);
     let asked = if closed_loop.has_parameter { options.rate.or(own) } else { Some(0.0) };
     let cost_factor = match (closed_loop.has_parameter, own) {
@@ -239,7 +259,15 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         }
         claims.push(claim);
     }
-    Ok(Proofs { claims, asked: asked.is_some(), stable_up_to: reached[0], cost_up_to: reached[1], cost_factor, level })
+    claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
+    let mut nonlinear = None;
+    if options.nonlinear {
+        let (found, proof) = nonlinear::prove(&closed_loop, &words, level);
+        claims.extend(found);
+        nonlinear = proof;
+    }
+    let [stable_up_to, cost_up_to] = reached;
+    Ok(Proofs { claims, asked: asked.is_some(), stable_up_to, cost_up_to, cost_factor, level, nonlinear })
 }
 
 /// P(ρ) of the Lyapunov function that [`prove`] is about; `None` where there is none.
@@ -277,6 +305,7 @@ impl Words {
                     rate,
                     state: closed_loop.state(t, &direction),
                     value,
+                    ..Witness::default()
                 };
                 let detail = format!("fails{} with rate {rate:.4}", place(t));
                 (Verdict::Refuted, value, detail, Some(witness))
@@ -296,9 +325,7 @@ impl Words {
 
 fn definite(closed_loop: &ClosedLoop, words: &Words) -> Claim {
     let started = Instant::now();
-    let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place, outer: Option<&CellMatrix>| {
-        closed_loop.bordered(place, None, outer)
-    });
+    let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| closed_loop.bordered(place, None));
     let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
     words.claim(format!("P is positive definite{}", words.every), attempt, closed_loop, cells.len(), started)
 }
@@ -307,11 +334,10 @@ fn definite(closed_loop: &ClosedLoop, words: &Words) -> Claim {
 fn unsaturated(closed_loop: &ClosedLoop, words: &Words, sigma: &[f64], gamma: f64) -> (Claim, f64) {
     let started = Instant::now();
     let attempt = |level: f64| {
-        let mut cells =
-            Cells::new(closed_loop.pieces, closed_loop.inputs(), |place: &Place, outer: Option<&CellMatrix>| {
-                let bound = Interval::point(sigma[place.variant]) * sigma[place.variant] / level;
-                closed_loop.bordered(place, Some(bound), outer)
-            });
+        let mut cells = Cells::new(closed_loop.pieces, closed_loop.inputs(), |place: &Place| {
+            let bound = Interval::point(sigma[place.variant]) * sigma[place.variant] / level;
+            closed_loop.bordered(place, Some((Row::Input(place.variant), bound)))
+        });
         let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
         (level, attempt, cells.len())
     };

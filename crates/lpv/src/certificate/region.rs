@@ -1,4 +1,4 @@
-//! What a design guarantees for one step of a flight.
+//! What a design's bound is worth for one step of a flight.
 
 use super::Verdict;
 use crate::controller::cubic_weights;
@@ -91,6 +91,34 @@ pub fn step_bound(design: &Design, scheduling: Option<&Scheduling>, step: &StepC
     StepBound { bound, level, unmet: [outside, moves, noise].into_iter().flatten().collect() }
 }
 
+/// When a flight was beyond what a bound is for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Excursion {
+    /// First time beyond.
+    pub from_s: f64,
+    /// Last time beyond.
+    pub to_s: f64,
+    /// Time beyond in between, altogether.
+    pub total_s: f64,
+}
+
+/// The excursion over samples at `times`, each of which stands for the time up to the next; `None` if none `is_beyond`.
+pub fn excursion(times: &[f64], is_beyond: impl Fn(usize) -> bool) -> Option<Excursion> {
+    let mut found: Option<Excursion> = None;
+    for k in (0..times.len()).filter(|&k| is_beyond(k)) {
+        let until = times.get(k + 1).copied().unwrap_or(times[k]);
+        let so_far = found.get_or_insert(Excursion { from_s: times[k], to_s: until, total_s: 0.0 });
+        so_far.to_s = until;
+        so_far.total_s += until - times[k];
+    }
+    found
+}
+
+/// V = eᵀP(ρ)e for the error e, with P between the grid points as in [`step_bound`].
+pub fn lyapunov_value(design: &Design, scheduling: Option<&Scheduling>, rho: f64, error: &[f64]) -> f64 {
+    quadratic_form(&lyapunov_matrix(design, scheduling, rho), error)
+}
+
 /// The largest γ such that u = −Kx does not saturate, |kᵢx| ≤ σᵢ, on xᵀPx ≤ γ: min σᵢ²/(kᵢP⁻¹kᵢᵀ) (Lemma 2.2).
 pub fn unsaturated_level(p: &Mat<f64>, k: &Mat<f64>, sigma: &[f64]) -> f64 {
     let Some(y) = inverse_spd(p) else {
@@ -115,4 +143,17 @@ fn lyapunov_matrix(design: &Design, scheduling: Option<&Scheduling>, rho: f64) -
         let p = &design.points[k].p;
         Mat::from_fn(n, n, |i, j| sum[(i, j)] + weight * p[(i, j)])
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn excursions_say_when_and_for_how_long() {
+        let times = [0.0, 0.5, 1.0, 1.5, 2.0];
+        assert_eq!(excursion(&times, |_| false), None);
+        let beyond = excursion(&times, |k| k == 1 || k == 3).unwrap();
+        assert_eq!(beyond, Excursion { from_s: 0.5, to_s: 2.0, total_s: 1.0 });
+    }
 }

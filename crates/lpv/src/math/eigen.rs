@@ -20,6 +20,13 @@ pub fn smallest_eigenvector(matrix: &Mat<f64>) -> Option<Vec<f64>> {
     Some((0..matrix.nrows()).map(|i| eigen.U()[(i, 0)]).collect())
 }
 
+/// Orthonormal eigenvectors of a symmetric matrix as columns, to rounding, by ascending eigenvalue; `None` for a matrix with
+/// a non-finite entry.
+pub fn symmetric_eigenvectors(matrix: &Mat<f64>) -> Option<Mat<f64>> {
+    let eigen = matrix.self_adjoint_eigen(Side::Lower).ok()?;
+    Some(Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| eigen.U()[(i, j)]))
+}
+
 /// The eigenvalues (re, im) of a real square matrix, in no particular order.
 pub fn eigenvalues(matrix: &Mat<f64>) -> Vec<(f64, f64)> {
     match matrix.eigenvalues() {

@@ -172,6 +172,9 @@ impl Div for Interval {
         if other.contains(0.0) {
             return Self::ENTIRE;
         }
+        if self.is_zero() && other.magnitude().is_finite() {
+            return self;
+        }
         let [a, b, c, d] = [self.lo / other.lo, self.lo / other.hi, self.hi / other.lo, self.hi / other.hi];
         if a.is_nan() || b.is_nan() || c.is_nan() || d.is_nan() {
             return Self::ENTIRE;

@@ -50,6 +50,7 @@ impl From<f64> for Taylor {
 impl Add for Taylor {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         let bend = self.bend.zip(other.bend).map(|(f, g)| f + g);
         Self { value: self.value + other.value, slope: self.slope + other.slope, bend }
@@ -59,6 +60,7 @@ impl Add for Taylor {
 impl Sub for Taylor {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         let bend = self.bend.zip(other.bend).map(|(f, g)| f - g);
         Self { value: self.value - other.value, slope: self.slope - other.slope, bend }
@@ -77,6 +79,7 @@ impl Mul for Taylor {
     type Output = Self;
 
     /// (fg)″ = f″g + 2f′g′ + fg″
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self {
             value: self.value * other.value,
@@ -135,6 +138,7 @@ impl From<f64> for TaylorDual {
 impl Add for TaylorDual {
     type Output = Self;
 
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self { value: self.value + other.value, derivative: self.derivative + other.derivative }
     }
@@ -143,6 +147,7 @@ impl Add for TaylorDual {
 impl Sub for TaylorDual {
     type Output = Self;
 
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self { value: self.value - other.value, derivative: self.derivative - other.derivative }
     }
@@ -159,6 +164,7 @@ impl Neg for TaylorDual {
 impl Mul for TaylorDual {
     type Output = Self;
 
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self {
             value: self.value * other.value,

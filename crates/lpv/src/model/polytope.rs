@@ -95,6 +95,23 @@ impl Polytope {
         self.a.len()
     }
 
+    /// A fingerprint of the matrices: 16 hexadecimal digits, the same exactly for the same numbers in the same order. Two models
+    /// share one by chance only (FNV-1a, 64 bits).
+    pub fn fingerprint(&self) -> String {
+        let sizes = [self.len(), self.states(), self.inputs()].map(|size| size as u64);
+        let entries = self.a.iter().chain(&self.b).flat_map(|matrix| {
+            // −0 is 0
+            let entry = |at: usize| (matrix[(at / matrix.ncols(), at % matrix.ncols())] + 0.0).to_bits();
+            (0..matrix.nrows() * matrix.ncols()).map(entry).collect::<Vec<u64>>()
+        });
+        let hash = sizes
+            .into_iter()
+            .chain(entries)
+            .flat_map(u64::to_le_bytes)
+            .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3));
+        format!("{hash:016x}")
+    }
+
     /// Never: there is at least one vertex.
     pub fn is_empty(&self) -> bool {
         self.a.is_empty()

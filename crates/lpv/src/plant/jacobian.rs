@@ -57,8 +57,18 @@ impl<E: Equations> Plant for E {
         jacobian(u, rows, b, |u, dx| Equations::dynamics(self, &x, u, &w, dx));
     }
 
-    fn linearization_over(&self, rho: Taylor) -> (Vec<Taylor>, Vec<Taylor>) {
-        let (x, u) = Equations::trim(self, rho);
+    fn trim_over(&self, rho: Taylor) -> (Vec<Taylor>, Vec<Taylor>) {
+        Equations::trim(self, rho)
+    }
+
+    fn dynamics_over(&self, x: &[Taylor], u: &[Taylor]) -> Vec<Taylor> {
+        let w = vec![Taylor::from(0.0); Equations::description(self).disturbances.len()];
+        let mut dx = vec![Taylor::from(0.0); x.len()];
+        Equations::dynamics(self, x, u, &w, &mut dx);
+        dx
+    }
+
+    fn jacobians_over(&self, x: &[Taylor], u: &[Taylor]) -> (Vec<Taylor>, Vec<Taylor>) {
         let w = vec![TaylorDual::from(0.0); Equations::description(self).disturbances.len()];
         let (n, m) = (x.len(), u.len());
         let lift = |values: &[Taylor], variable: Option<usize>| -> Vec<TaylorDual> {
@@ -67,14 +77,24 @@ impl<E: Equations> Plant for E {
         let (mut a, mut b) = (vec![Taylor::from(0.0); n * n], vec![Taylor::from(0.0); n * m]);
         let mut dx = vec![TaylorDual::from(0.0); n];
         for j in 0..n {
-            Equations::dynamics(self, &lift(&x, Some(j)), &lift(&u, None), &w, &mut dx);
+            Equations::dynamics(self, &lift(x, Some(j)), &lift(u, None), &w, &mut dx);
             dx.iter().enumerate().for_each(|(i, dx)| a[i * n + j] = dx.derivative);
         }
         for j in 0..m {
-            Equations::dynamics(self, &lift(&x, None), &lift(&u, Some(j)), &w, &mut dx);
+            Equations::dynamics(self, &lift(x, None), &lift(u, Some(j)), &w, &mut dx);
             dx.iter().enumerate().for_each(|(i, dx)| b[i * m + j] = dx.derivative);
         }
         (a, b)
+    }
+
+    fn input_derivative_over(&self, x: &[Taylor], u: &[Taylor], direction: &[f64]) -> Vec<Taylor> {
+        let w = vec![TaylorDual::from(0.0); Equations::description(self).disturbances.len()];
+        let x: Vec<TaylorDual> = x.iter().map(|&value| TaylorDual::new(value, false)).collect();
+        let along = |(&value, &slope): (&Taylor, &f64)| TaylorDual { value, derivative: Taylor::from(slope) };
+        let u: Vec<TaylorDual> = u.iter().zip(direction).map(along).collect();
+        let mut dx = vec![TaylorDual::from(0.0); x.len()];
+        Equations::dynamics(self, &x, &u, &w, &mut dx);
+        dx.iter().map(|dx| dx.derivative).collect()
     }
 
     fn dynamics_by_disturbance(&self, x: &[f64], u: &[f64], w: &[f64], l: &mut [f64]) {

@@ -184,9 +184,18 @@ pub trait Plant: Send + Sync {
     /// C = ∂h/∂x, n_y × n (2.54).
     fn measurement_by_state(&self, x: &[f64], v: &[f64], c: &mut [f64]);
 
-    /// A and B at the operating points of `rho`, a function of one variable: enclosures of values and derivatives, in row
-    /// order.
-    fn linearization_over(&self, rho: Taylor) -> (Vec<Taylor>, Vec<Taylor>);
+    /// x* and u* at the operating points of `rho`, a function of one variable: enclosures of values and derivatives.
+    fn trim_over(&self, rho: Taylor) -> (Vec<Taylor>, Vec<Taylor>);
+
+    /// f(x, u, 0) for x and u that are functions of one variable, or constants known to lie in intervals.
+    fn dynamics_over(&self, x: &[Taylor], u: &[Taylor]) -> Vec<Taylor>;
+
+    /// A = ∂f/∂x and B = ∂f/∂u at such x and u without disturbance, in row order.
+    fn jacobians_over(&self, x: &[Taylor], u: &[Taylor]) -> (Vec<Taylor>, Vec<Taylor>);
+
+    /// (∂f/∂u) `direction` at such x and u without disturbance: n functions, in which terms that cancel along the direction
+    /// have cancelled.
+    fn input_derivative_over(&self, x: &[Taylor], u: &[Taylor], direction: &[f64]) -> Vec<Taylor>;
 
     /// M = ∂h/∂v, n_y × n_y (2.55).
     fn measurement_by_noise(&self, x: &[f64], v: &[f64], m: &mut [f64]);

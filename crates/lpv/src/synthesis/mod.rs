@@ -19,6 +19,7 @@
 //! To add a method: one file with its inequalities, one variant in [`Method`].
 
 mod back_off;
+pub mod bounded_real;
 mod design;
 mod flatness;
 mod high_gain;

@@ -1,12 +1,15 @@
 //! What is proved stays true under exact arithmetic and random sampling, and what is false is never proved.
 
 use crate::quadrotor::{limits, plant, spec, weights};
-use lpv::certificate::{Claim, ProofOptions, Verdict, lyapunov_matrix, prove};
+use lpv::certificate::{
+    Claim, PolytopicClaim, PolytopicLyapunov, ProofOptions, Verdict, lyapunov_matrix, prove, prove_polytopic,
+};
 use lpv::controller::{InputLimits, Schedule};
 use lpv::math::Mat;
 use lpv::math::matrix::{diagonal, quadratic_form};
-use lpv::model::{MatrixFunction, linearize};
+use lpv::model::{MatrixFunction, Polytope, linearize};
 use lpv::plant::{LinearParameters, PlantSpec};
+use lpv::synthesis::polytopic::InputBounds;
 use lpv::synthesis::{CostWeights, Design, DesignRequest, Method, RateBoundedOptions, ScheduleKind, design};
 
 /// A stream of numbers in (−1, 1) from a seed.
@@ -147,6 +150,86 @@ fn the_edge_is_found() {
     }
 }
 
+/// ẋ = x + u with u = −2x held for T: x₊ = (2 − e^T)x, stable up to T = ln 3; and ẋ = u, whose series ends, up to T = 1.
+#[test]
+fn the_sampled_loop_is_proved_up_to_its_edge() {
+    let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+    for (a, edge) in [(1.0, 3.0_f64.ln()), (0.0, 1.0)] {
+        let spec = PlantSpec::Linear(LinearParameters { a: vec![vec![a]], b: vec![vec![1.0]], c: None });
+        let plant = spec.build().unwrap();
+        for (sample_time_s, expected) in
+            [(edge * (1.0 - 1e-6), Verdict::Proved), (edge * (1.0 + 1e-6), Verdict::Undecided)]
+        {
+            let request = DesignRequest {
+                name: "sampled".into(),
+                method: Method::Lpvqr,
+                weights: CostWeights { q: scalar(1.0), r: scalar(1.0) },
+                grid_points: 1,
+                schedule: ScheduleKind::Grid,
+                limits: InputLimits::none(1),
+                sample_time_s,
+                rate_bounded: None,
+            };
+            let mut design = design(&spec, &*plant, &request, &|_| {}).unwrap();
+            design.controller.schedule = Schedule::Constant { gain: scalar(2.0) };
+            let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
+            assert_eq!(claim(&proofs.claims, "zero-order hold").verdict, expected, "a = {a}, T = {sample_time_s}");
+        }
+    }
+}
+
+/// Ten thousand scalar polytopes with two vertices: model, Y, L, γ, σ and rates at random, every number a multiple of 1/16. What is
+/// proved is true in integers at nine points of the polytope; what is refuted is false at one of them.
+#[test]
+fn polytopes_are_proved_only_if_integers_agree() {
+    let mut numbers = Numbers(5);
+    let mut integer = |size: i128| (numbers.next() * size as f64).round() as i128;
+    let mut counts = std::collections::BTreeMap::new();
+    for case in 0..10_000 {
+        let spread = 1 << (case % 6);
+        let (y0, l0) = (16 + integer(12), 24 + integer(16));
+        let a = [integer(12), integer(12)];
+        let b = [16 + integer(4), 16 + integer(4)];
+        let y = [y0, (y0 + integer(spread)).max(1)];
+        let l = [l0, l0 + integer(spread)];
+        let [nu, q, r, sigma, gamma] =
+            [integer(spread).abs(), 2 + integer(1), 2 + integer(1), 40 + integer(24), 16 + integer(8)];
+        let scalars = |values: [i128; 2]| values.map(|value| Mat::from_fn(1, 1, |_, _| value as f64 / 16.0)).to_vec();
+        let rate = nu as f64 / 16.0;
+        let request = PolytopicClaim {
+            polytope: Polytope::new(scalars(a), scalars(b)).unwrap(),
+            lyapunov: PolytopicLyapunov::ParameterDependent {
+                y: scalars(y),
+                l: scalars(l),
+                rate_vertices: vec![vec![rate, -rate], vec![-rate, rate]],
+            },
+            auxiliary_gain: None,
+            weights: Some(CostWeights { q: scalars([q, q])[0].clone(), r: scalars([r, r])[0].clone() }),
+            saturation: Some(InputBounds { sigma: vec![sigma as f64 / 16.0], gamma: gamma as f64 / 16.0 }),
+        };
+        let at = |k: i128, values: [i128; 2]| k * values[0] + (8 - k) * values[1];
+        // in units of 1/(8·16)² and of its multiples
+        let flow = |k: i128, nu: i128| -2 * (at(k, a) * at(k, y) - at(k, b) * at(k, l)) + 64 * nu * (y[0] - y[1]);
+        let everywhere = |holds: &dyn Fn(i128, i128) -> bool| (0..=8).all(|k| [-nu, nu].iter().all(|&nu| holds(k, nu)));
+        let decreases = everywhere(&|k, nu| flow(k, nu) > 0);
+        let costs = everywhere(&|k, nu| 16 * flow(k, nu) - at(k, y).pow(2) * q - at(k, l).pow(2) * r > 0);
+        let unsaturated = everywhere(&|k, _| sigma * sigma * at(k, y) * 8 > gamma * at(k, l).pow(2));
+        let claims = prove_polytopic(&request);
+        for (words, truth) in [("is invariant", decreases), ("does not saturate", unsaturated), ("at most 1 V", costs)]
+        {
+            // the cost with a factor is another claim
+            let Some(claim) = claims.iter().find(|claim| claim.claim.contains(words)) else { continue };
+            assert!(truth || claim.verdict != Verdict::Proved, "case {case}: {words} is false and proved");
+            assert!(!truth || claim.verdict != Verdict::Refuted, "case {case}: {words} is true and refuted");
+            *counts.entry((words, claim.verdict.word())).or_insert(0) += 1;
+        }
+    }
+    for words in ["is invariant", "does not saturate", "at most 1 V"] {
+        let of = |verdict: &str| counts.get(&(words, verdict)).copied().unwrap_or(0);
+        assert!(of("refuted") > 300 && of("proved") > 300, "{counts:?}: the test tests something");
+    }
+}
+
 /// The largest proved rates of the frozen designs, against a computation in coordinates that rotate with the vehicle:
 /// 76.1 rad/s and 0.38 rad/s.
 #[test]
@@ -160,18 +243,16 @@ fn rates_of_the_frozen_designs() {
         let rate = proofs.stable_up_to.unwrap();
         assert!((0.9 * expected..1.005 * expected).contains(&rate), "{rate} is not {expected}");
         // beyond it there is a motion along which V grows
-        let beyond = prove(&design, &*plant, &ProofOptions { rate: Some(1.2 * expected), level: None }).unwrap();
+        let beyond =
+            prove(&design, &*plant, &ProofOptions { rate: Some(1.2 * expected), ..ProofOptions::default() }).unwrap();
         let claim = beyond.claims.iter().find(|claim| claim.verdict == Verdict::Refuted).unwrap();
         let witness = claim.witness.as_ref().unwrap();
         assert!(witness.value < 0.0 && witness.state.len() == 12 && witness.rate.abs() > expected);
     }
 }
 
-/// The full circle at ±2 rad/s, and then random yaws, rates and states: V falls by the cost, and the input stays unsaturated
-/// in the set.
-#[test]
-fn a_design_for_a_rate_is_proved_and_samples_agree() {
-    let plant = plant();
+/// SLPVQR with γ = 1, made for yaw rates up to 2 rad/s and for the reach along x.
+fn made_for_a_rate() -> Design {
     let mut direction = vec![0.0; 12];
     direction[3] = 1.0;
     let request = DesignRequest {
@@ -184,7 +265,20 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
         sample_time_s: 0.002,
         rate_bounded: Some(RateBoundedOptions { rate: 2.0, order: 2, direction: Some(direction) }),
     };
-    let design = design(&spec(9.807), &*plant, &request, &|_| {}).unwrap();
+    design(&spec(9.807), &*plant(), &request, &|_| {}).unwrap()
+}
+
+/// Random states x with xᵀPx at most `level`.
+fn inside(numbers: &mut Numbers, p: &Mat<f64>, level: f64) -> Vec<f64> {
+    let x: Vec<f64> = (0..12).map(|_| numbers.next()).collect();
+    let scale = (level / quadratic_form(p, &x)).sqrt() * numbers.next().abs();
+    x.iter().map(|value| scale * value).collect()
+}
+
+/// The full circle at ±2 rad/s, and then random yaws, rates and states: V falls by the cost, and the input stays unsaturated
+/// in the set.
+fn proved_and_sampled(matrices: usize, states: usize) {
+    let (plant, design) = (plant(), made_for_a_rate());
     let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
     assert!(proofs.claims.iter().all(|claim| claim.verdict == Verdict::Proved), "{:?}", proofs.claims);
     assert_eq!((proofs.stable_up_to, proofs.cost_up_to, proofs.level), (Some(2.0), Some(2.0), Some(1.0)));
@@ -193,7 +287,7 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
 
     let y = &design.rate_bounded.as_ref().unwrap().y;
     let mut numbers = Numbers(3);
-    for _ in 0..2000 {
+    for _ in 0..matrices {
         let (rho, rate) = (3.2 * numbers.next(), 2.0 * numbers.next());
         let p = lyapunov_matrix(&design, &*plant, rho).unwrap();
         let p_rate = -1.0 * (&p * (rate * y.derivative(&[rho], 0)) * &p);
@@ -202,7 +296,7 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
         let flow = &p * (&model.a - &model.b * &k);
         let stage = &design.weights.q + k.transpose() * &design.weights.r * &k;
         let change = proofs.cost_factor * (&flow + flow.transpose() + &p_rate) + &stage;
-        for _ in 0..50 {
+        for _ in 0..states {
             let mut x: Vec<f64> = (0..12).map(|_| numbers.next()).collect();
             assert!(quadratic_form(&change, &x) < 0.0, "yaw {rho}, rate {rate}, {x:?}");
             let scale = (1.0 / quadratic_form(&p, &x)).sqrt();
@@ -212,6 +306,48 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
                 assert!(input.abs() <= 9.807 / 2.0, "yaw {rho}, input {i}: {input}");
             }
         }
+    }
+}
+
+#[test]
+fn a_design_for_a_rate_is_proved_and_samples_agree() {
+    proved_and_sampled(1000, 20);
+}
+
+#[test]
+#[ignore = "a million samples: run it in release"]
+fn a_million_samples_agree() {
+    proved_and_sampled(20_000, 50);
+}
+
+/// Of the nonlinear plant: in the proved set V falls along its equations with the gain that flies, and the set is in the box.
+#[test]
+fn the_set_is_invariant_for_the_nonlinear_plant() {
+    let (plant, design) = (plant(), made_for_a_rate());
+    let options = ProofOptions { level: Some(0.005), nonlinear: true, ..ProofOptions::default() };
+    let proofs = prove(&design, &*plant, &options).unwrap();
+    let nonlinear = proofs.nonlinear.expect("something is proved");
+    assert_eq!(claim(&proofs.claims, "the nonlinear plant: x'P x <=").verdict, Verdict::Proved);
+    assert!(nonlinear.level >= 0.0049 && nonlinear.rate < 2.0, "{nonlinear:?}");
+    let y = &design.rate_bounded.as_ref().unwrap().y;
+    let mut numbers = Numbers(11);
+    for _ in 0..2000 {
+        let psi = 3.2 * numbers.next();
+        let p = lyapunov_matrix(&design, &*plant, psi).unwrap();
+        let e = inside(&mut numbers, &p, nonlinear.level);
+        for &(i, radius) in &nonlinear.radii {
+            assert!(e[i].abs() <= radius, "state {i}: {} is more than {radius}", e[i]);
+        }
+        let k = design.controller.schedule.gain_matrix(psi);
+        let u: Vec<f64> = (0..4).map(|i| 9.807 / 2.0 - (0..12).map(|j| k[(i, j)] * e[j]).sum::<f64>()).collect();
+        let mut x = e.clone();
+        x[11] = psi;
+        let mut dx = vec![0.0; 12];
+        plant.dynamics(&x, &u, &[0.0; 4], &mut dx);
+        assert!(dx[11].abs() <= nonlinear.rate);
+        let p_rate = -1.0 * (&p * (dx[11] * y.derivative(&[psi], 0)) * &p);
+        let along: f64 = (0..12).map(|i| (0..12).map(|j| 2.0 * e[i] * p[(i, j)] * dx[j]).sum::<f64>()).sum();
+        assert!(along + quadratic_form(&p_rate, &e) < 0.0, "yaw {psi}, {e:?}");
     }
 }
 

@@ -1,19 +1,22 @@
 //! The closed LPV loop and its Lyapunov function over the continuous range of the parameter, as enclosures on cells.
 
 use super::matrix::{CellMatrix, TaylorMatrix};
-use crate::controller::Schedule;
+use crate::controller::{InputLimits, Schedule};
 use crate::math::Mat;
 use crate::math::interval::Interval;
-use crate::math::matrix::inverse_spd;
+use crate::math::matrix::{inverse_spd, quadratic_form};
 use crate::math::taylor::{Taylor, TaylorDual};
 use crate::model::MatrixFunction;
-use crate::plant::Plant;
+use crate::plant::{Description, Plant};
 use crate::synthesis::{CostWeights, Design};
 
 /// Pieces that the circle is cut into where the gain is one formula everywhere.
 const PIECES: usize = 16;
 /// Harmonics of P smaller than this, against its largest entry, are rounding errors.
 const HARMONIC_TOLERANCE: f64 = 1e-12;
+
+/// Parameter values at which a level is guessed, for each piece.
+const LEVEL_SAMPLES_PER_PIECE: usize = 4;
 
 /// V(x, ρ) in one of its two forms.
 #[derive(Clone, Debug)]
@@ -37,9 +40,10 @@ pub enum Unprovable {
 
 /// Everything that the claims are about.
 pub(super) struct ClosedLoop<'a> {
-    plant: &'a dyn Plant,
+    pub plant: &'a dyn Plant,
     schedule: &'a Schedule,
-    weights: &'a CostWeights,
+    pub weights: &'a CostWeights,
+    pub limits: &'a InputLimits,
     pub form: Form,
     /// F(ρ) that stays unsaturated; in the inverse form L = FY.
     auxiliary: Option<MatrixFunction>,
@@ -50,6 +54,15 @@ pub(super) struct ClosedLoop<'a> {
     pub pieces: usize,
     /// The parameter can move at all.
     pub has_parameter: bool,
+}
+
+/// Which row borders P or Y, see [`ClosedLoop::bordered`].
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Row {
+    /// Of the unsaturated gain, of input `i`.
+    Input(usize),
+    /// The unit vector of state `i`.
+    State(usize),
 }
 
 /// A cell: |t − middle| ≤ half within [piece, piece + 1], of one variant of a claim (mixture of rows, input).
@@ -66,6 +79,20 @@ pub(super) struct Decrease {
     pub constant: CellMatrix,
     pub rate: CellMatrix,
     pub cost: CellMatrix,
+}
+
+/// The matrices of the claims as functions of the cell's variable, for one mixture of rows.
+pub(super) struct Parts {
+    /// −(P(A − BS) + ·ᵀ), or −((AY − BSY) + ·ᵀ)
+    pub constant: TaylorMatrix,
+    /// What ρ̇ multiplies.
+    pub rate: TaylorMatrix,
+    /// −(Q + SᵀRS), or the same between Y.
+    pub cost: TaylorMatrix,
+    /// P or Y.
+    pub lyapunov: TaylorMatrix,
+    /// S or SY.
+    pub gain: TaylorMatrix,
 }
 
 impl<'a> ClosedLoop<'a> {
@@ -120,12 +147,18 @@ impl<'a> ClosedLoop<'a> {
         };
         let weights = &design.weights;
         let has_parameter = scheduling.is_some();
-        Ok(Self { plant, schedule, weights, form, auxiliary, low, step, pieces, has_parameter })
+        let limits = &design.controller.limits;
+        Ok(Self { plant, schedule, weights, limits, form, auxiliary, low, step, pieces, has_parameter })
     }
 
     /// Number of mixtures of the rows of K and F: 2^m with an auxiliary gain, else K alone.
     pub fn mixtures(&self) -> usize {
         if self.auxiliary.is_some() { 1 << self.weights.r.nrows() } else { 1 }
+    }
+
+    /// What the plant is.
+    pub fn description(&self) -> &Description {
+        self.plant.description()
     }
 
     /// Number of inputs.
@@ -138,7 +171,8 @@ impl<'a> ClosedLoop<'a> {
         self.low + t * self.step.middle()
     }
 
-    fn rho(&self, t: Taylor) -> Taylor {
+    /// ρ as a function of `t`.
+    pub fn rho(&self, t: Taylor) -> Taylor {
         t * Taylor::constant(self.step) + self.low
     }
 
@@ -154,13 +188,26 @@ impl<'a> ClosedLoop<'a> {
         combine(function, &factors)
     }
 
-    /// The parts of the decrease with the mixture number `mixture`, over `t` of piece `piece`.
-    fn parts(&self, piece: usize, mixture: usize, t: Taylor) -> [TaylorMatrix; 3] {
+    /// The gain that flies at position `t`, as numbers.
+    pub fn gain(&self, t: f64) -> Mat<f64> {
+        self.schedule.gain_matrix(self.parameter(t))
+    }
+
+    /// A, B and the gain that flies, over `t` of piece `piece`.
+    pub fn model_and_gain(&self, piece: usize, t: Taylor) -> (TaylorMatrix, TaylorMatrix, TaylorMatrix) {
         let rho = self.rho(t);
         let (n, m) = (self.weights.q.nrows(), self.inputs());
-        let (a, b) = self.plant.linearization_over(rho);
-        let (a, b) = (TaylorMatrix::new(n, n, a), TaylorMatrix::new(n, m, b));
-        let k = TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho));
+        let (x, u) = self.plant.trim_over(rho);
+        let (a, b) = self.plant.jacobians_over(&x, &u);
+        let k = self.schedule.gain_on_piece(piece, t, rho);
+        (TaylorMatrix::new(n, n, a), TaylorMatrix::new(n, m, b), TaylorMatrix::new(m, n, k))
+    }
+
+    /// The parts of the decrease with the mixture number `mixture`, over `t` of piece `piece`.
+    pub fn parts(&self, piece: usize, mixture: usize, t: Taylor) -> Parts {
+        let rho = self.rho(t);
+        let (n, m) = (self.weights.q.nrows(), self.inputs());
+        let (a, b, k) = self.model_and_gain(piece, t);
         let CostWeights { q, r } = self.weights;
         let mixed = |k: TaylorMatrix, f: Option<TaylorMatrix>| match f {
             None => k,
@@ -172,75 +219,110 @@ impl<'a> ClosedLoop<'a> {
                 let (p_rate, p) = (self.derivative(p, rho), self.function(p, rho));
                 let s = mixed(k, auxiliary);
                 let flow = p.times(&b.times(&s).minus(&a));
-                [
-                    flow.plus(&flow.transpose()),
-                    p_rate.negated(),
-                    s.quadratic(r).plus(&TaylorMatrix::constant(q)).negated(),
-                ]
+                Parts {
+                    constant: flow.plus(&flow.transpose()),
+                    rate: p_rate.negated(),
+                    cost: s.quadratic(r).plus(&TaylorMatrix::constant(q)).negated(),
+                    lyapunov: p,
+                    gain: s,
+                }
             }
             Form::Inverse(y) => {
                 let (y_rate, y) = (self.derivative(y, rho), self.function(y, rho));
                 let sy = mixed(k.times(&y), auxiliary);
                 let flow = b.times(&sy).minus(&a.times(&y));
-                let cost = sy.quadratic(r).plus(&y.quadratic(q));
-                [flow.plus(&flow.transpose()), y_rate, cost.negated()]
+                let cost = sy.quadratic(r).plus(&y.quadratic(q)).negated();
+                Parts { constant: flow.plus(&flow.transpose()), rate: y_rate, cost, lyapunov: y, gain: sy }
             }
         }
     }
 
-    /// [`Decrease`] on the cell |t − `middle`| ≤ `half`, within the cell of `outer` if there is one.
-    pub fn decrease(&self, place: &Place, outer: Option<&Decrease>) -> Decrease {
+    /// The parts over the whole cell, and their values and slopes in its middle.
+    pub fn parts_on(&self, place: &Place) -> [Parts; 2] {
         let Place { piece, variant: mixture, middle, half } = *place;
-        let over = match outer {
-            None => Some(self.parts(piece, mixture, Taylor::variable(Interval::new(middle - half, middle + half)))),
-            Some(_) => None,
-        };
-        let middle = self.parts(piece, mixture, Taylor::variable_of_first_order(Interval::point(middle)));
-        let part = |i: usize, of: fn(&Decrease) -> &CellMatrix| match (&over, outer) {
-            (Some(over), _) => CellMatrix::new(&middle[i], Ok(&over[i])),
-            (None, Some(outer)) => CellMatrix::new(&middle[i], Err(of(outer))),
-            (None, None) => CellMatrix::new(&middle[i], Ok(&middle[i])),
-        };
-        Decrease { constant: part(0, |d| &d.constant), rate: part(1, |d| &d.rate), cost: part(2, |d| &d.cost) }
+        let over = self.parts(piece, mixture, Taylor::variable(Interval::new(middle - half, middle + half)));
+        [over, self.parts(piece, mixture, Taylor::variable_of_first_order(Interval::point(middle)))]
     }
 
-    /// P or Y on the cell; bordered by row `variant` of the unsaturated gain and `bound` = σ²/γ where one is asked for (5.21):
-    /// its positivity is |fx| < σ on V ≤ γ.
-    pub fn bordered(&self, place: &Place, bound: Option<Interval>, outer: Option<&CellMatrix>) -> CellMatrix {
-        let Place { piece, variant: input, middle, half } = *place;
-        let at = |t: Taylor| self.bordered_at(piece, bound.map(|bound| (input, bound)), t);
-        let middle_form = at(Taylor::variable_of_first_order(Interval::point(middle)));
-        match outer {
-            Some(outer) => CellMatrix::new(&middle_form, Err(outer)),
-            None => {
-                let over = at(Taylor::variable(Interval::new(middle - half, middle + half)));
-                CellMatrix::new(&middle_form, Ok(&over))
-            }
-        }
+    /// [`Decrease`] on the cell.
+    pub fn decrease(&self, place: &Place) -> Decrease {
+        let [over, middle] = self.parts_on(place);
+        Decrease::new(&over, &middle)
     }
 
-    fn bordered_at(&self, piece: usize, input: Option<(usize, Interval)>, t: Taylor) -> TaylorMatrix {
+    /// P or Y on the cell; bordered by a row f and a bound b² where one is asked for (5.21): its positivity is (fx)² < b²
+    /// on V ≤ 1.
+    pub fn bordered(&self, place: &Place, border: Option<(Row, Interval)>) -> CellMatrix {
+        let Place { piece, middle, half, .. } = *place;
+        let over = self.bordered_at(piece, border, Taylor::variable(Interval::new(middle - half, middle + half)));
+        let middle = self.bordered_at(piece, border, Taylor::variable_of_first_order(Interval::point(middle)));
+        CellMatrix::new(&middle, &over)
+    }
+
+    fn bordered_at(&self, piece: usize, border: Option<(Row, Interval)>, t: Taylor) -> TaylorMatrix {
         let rho = self.rho(t);
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let (Form::Direct(function) | Form::Inverse(function)) = &self.form;
         let matrix = self.function(function, rho);
-        let Some((input, bound)) = input else { return matrix };
-        let gain = match &self.auxiliary {
-            Some(auxiliary) => self.function(auxiliary, rho),
-            None => {
-                let k = TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho));
-                match self.form {
-                    Form::Direct(_) => k,
-                    Form::Inverse(_) => k.times(&matrix),
-                }
+        let Some((row, bound)) = border else { return matrix };
+        let row: Vec<Taylor> = match row {
+            Row::Input(i) => {
+                // that row alone
+                let row = |gain: &TaylorMatrix| TaylorMatrix::from_fn(1, n, |_, j| gain.at(i, j));
+                let gain = match &self.auxiliary {
+                    Some(auxiliary) => row(&self.function(auxiliary, rho)),
+                    None => {
+                        let k = row(&TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho)));
+                        match self.form {
+                            Form::Direct(_) => k,
+                            Form::Inverse(_) => k.times(&matrix),
+                        }
+                    }
+                };
+                (0..n).map(|j| gain.at(0, j)).collect()
             }
+            Row::State(i) => match self.form {
+                Form::Direct(_) => (0..n).map(|j| Taylor::from(if i == j { 1.0 } else { 0.0 })).collect(),
+                Form::Inverse(_) => (0..n).map(|j| matrix.at(i, j)).collect(),
+            },
         };
         TaylorMatrix::from_fn(n + 1, n + 1, |i, j| match (i, j) {
             (0, 0) => Taylor::constant(bound),
-            (0, j) => gain.at(input, j - 1),
-            (i, 0) => gain.at(input, i - 1),
+            (0, j) => row[j - 1],
+            (i, 0) => row[i - 1],
             (i, j) => matrix.at(i - 1, j - 1),
         })
+    }
+
+    /// P⁻¹ and the gain that stays unsaturated at position `t`, as numbers; `None` where P is not definite.
+    pub fn inverse_and_gain(&self, t: f64) -> Option<(Mat<f64>, Mat<f64>)> {
+        let rho = self.parameter(t);
+        let y = match &self.form {
+            Form::Direct(p) => inverse_spd(&p.at(&[rho]))?,
+            Form::Inverse(y) => y.at(&[rho]),
+        };
+        let gain = match (&self.auxiliary, &self.form) {
+            (None, _) => self.schedule.gain_matrix(rho),
+            (Some(f), Form::Direct(_)) => f.at(&[rho]),
+            (Some(l), Form::Inverse(_)) => l.at(&[rho]) * inverse_spd(&y)?,
+        };
+        Some((y, gain))
+    }
+
+    /// Least level over sampled positions on which the gain that stays unsaturated reaches the bounds σ, as numbers: a guess
+    /// to be proved.
+    pub fn unsaturated_level(&self, sigma: &[f64]) -> f64 {
+        let samples = LEVEL_SAMPLES_PER_PIECE * self.pieces;
+        let level = |k: usize| {
+            let t = k as f64 / LEVEL_SAMPLES_PER_PIECE as f64;
+            let (y, gain) = self.inverse_and_gain(t)?;
+            let of_input = |i: usize| {
+                let row: Vec<f64> = (0..gain.ncols()).map(|j| gain[(i, j)]).collect();
+                sigma[i] * sigma[i] / quadratic_form(&y, &row)
+            };
+            Some((0..gain.nrows()).map(of_input).fold(f64::INFINITY, f64::min))
+        };
+        (0..samples).map(|k| level(k).unwrap_or(0.0)).fold(f64::INFINITY, f64::min)
     }
 
     /// The state that a direction of the decrease's matrix stands for at position `t`: itself, or Yz.
@@ -255,6 +337,17 @@ impl<'a> ClosedLoop<'a> {
     }
 }
 
+impl Decrease {
+    /// From the parts over a cell and in its middle.
+    pub fn new(over: &Parts, middle: &Parts) -> Self {
+        Self {
+            constant: CellMatrix::new(&middle.constant, &over.constant),
+            rate: CellMatrix::new(&middle.rate, &over.rate),
+            cost: CellMatrix::new(&middle.cost, &over.cost),
+        }
+    }
+}
+
 impl Form {
     /// P(ρ) as numbers; `None` where it is not definite.
     pub fn p(&self, rho: f64) -> Option<Mat<f64>> {
@@ -265,6 +358,7 @@ impl Form {
     }
 }
 
+/// Σ fₖMₖ with the values of the basis functions.
 pub(super) fn combine(function: &MatrixFunction, factors: &[Taylor]) -> TaylorMatrix {
     let (rows, columns) = function.shape();
     TaylorMatrix::from_fn(rows, columns, |i, j| {

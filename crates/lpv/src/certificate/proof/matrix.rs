@@ -114,13 +114,15 @@ pub(super) enum Definiteness {
         value: f64,
     },
     /// Neither: a smaller cell may tell, unless the middle itself is on the edge.
-    Open,
+    Open {
+        /// Half-width of a cell around the same middle that would be proved; 0 if none.
+        fits: f64,
+    },
 }
 
 impl CellMatrix {
-    /// From the Taylor forms at the middle and over the cell; the symmetric part is taken. A cell within another may take the
-    /// second derivatives of that: `over` is then the other's matrix.
-    pub fn new(middle: &TaylorMatrix, over: Result<&TaylorMatrix, &CellMatrix>) -> Self {
+    /// From the Taylor forms at the middle and over the cell; the symmetric part is taken.
+    pub fn new(middle: &TaylorMatrix, over: &TaylorMatrix) -> Self {
         let n = middle.rows;
         let half = |x: Interval| x * 0.5;
         let entry = |at: usize| (at / n, at % n);
@@ -131,10 +133,7 @@ impl CellMatrix {
             n,
             value: symmetric(&|i, j| middle.at(i, j).value),
             slope: symmetric(&|i, j| middle.at(i, j).slope),
-            bend: match over {
-                Ok(over) => symmetric(&|i, j| over.at(i, j).bend.unwrap_or(Interval::ENTIRE)),
-                Err(outer) => outer.bend.clone(),
-            },
+            bend: symmetric(&|i, j| over.at(i, j).bend.unwrap_or(Interval::ENTIRE)),
         }
     }
 
@@ -150,13 +149,24 @@ impl CellMatrix {
         Self { n, value: sum(&|m| &m.value), slope: sum(&|m| &m.slope), bend: sum(&|m| &m.bend) }
     }
 
+    /// The value in the middle, as numbers.
+    pub fn middle(&self) -> Mat<f64> {
+        Mat::from_fn(self.n, self.n, |i, j| self.value[i * self.n + j].middle())
+    }
+
+    /// Nothing is known.
+    pub fn unbounded(n: usize) -> Self {
+        let entire = vec![Interval::ENTIRE; n * n];
+        Self { n, value: entire.clone(), slope: entire.clone(), bend: entire }
+    }
+
     /// Is −M, or M, positive definite for all |t − c| ≤ `half`?
     ///
     /// With T ≈ L⁻ᵀ for M(c) ≈ LLᵀ the matrix TᵀM(t)T is near I; it is positive definite, and with it M(t) and T regular, if
     /// every row of its difference to I sums to less than 1 in absolute values (Gershgorin).
     pub fn is_positive(&self, half: f64) -> Definiteness {
         let n = self.n;
-        let middle = Mat::from_fn(n, n, |i, j| self.value[i * n + j].middle());
+        let middle = self.middle();
         let Some(inverse) = cholesky_inverse(&middle) else { return self.refutation(&middle) };
         // Tᵀ = L⁻¹, row order
         let factor = |i: usize, j: usize| inverse[(i, j)];
@@ -164,32 +174,46 @@ impl CellMatrix {
         let slope = congruence(n, &factor, &self.slope);
         let bend = congruence(n, &factor, &self.bend);
         let half = Interval::point(half);
-        let excess = |i: usize| {
-            (0..n).fold(Interval::point(0.0), |sum, j| {
+        let sums = |i: usize| {
+            (0..n).fold([Interval::point(0.0); 3], |[constant, linear, quadratic], j| {
                 let at = i * n + j;
                 let identity = if i == j { 1.0 } else { 0.0 };
-                let constant = Interval::point((value[at] - identity).magnitude());
-                let linear = half * slope[at].magnitude();
-                let quadratic = half.square() * 0.5 * bend[at].magnitude();
-                sum + constant + linear + quadratic
+                [
+                    constant + Interval::point((value[at] - identity).magnitude()),
+                    linear + Interval::point(slope[at].magnitude()),
+                    quadratic + Interval::point(bend[at].magnitude()) * 0.5,
+                ]
             })
         };
-        let largest = (0..n).map(|i| excess(i).hi()).fold(0.0, f64::max);
-        if largest < 1.0 { Definiteness::Proved((1.0 - largest).next_down()) } else { Definiteness::Open }
+        let sums: Vec<[Interval; 3]> = (0..n).map(sums).collect();
+        let excess = |[constant, linear, quadratic]: &[Interval; 3]| {
+            (*constant + half * *linear + half.square() * *quadratic).hi()
+        };
+        let largest = sums.iter().map(excess).fold(0.0, f64::max);
+        if largest < 1.0 {
+            return Definiteness::Proved((1.0 - largest).next_down());
+        }
+        // c + l h + q h² = 1
+        let fits = |[constant, linear, quadratic]: &[Interval; 3]| {
+            let (left, linear, quadratic) = (1.0 - constant.hi(), linear.hi(), quadratic.hi());
+            2.0 * left / (linear + (linear * linear + 4.0 * quadratic * left.max(0.0)).sqrt())
+        };
+        let fits = sums.iter().map(fits).fold(half.hi(), f64::min);
+        Definiteness::Open { fits: if fits > 0.0 { fits } else { 0.0 } }
     }
 
     /// zᵀM(c)z for the eigenvector z of the smallest eigenvalue, in interval arithmetic.
     fn refutation(&self, middle: &Mat<f64>) -> Definiteness {
         let n = self.n;
         let Some(direction) = smallest_eigenvector(middle).filter(|_| smallest_eigenvalue(middle) < 0.0) else {
-            return Definiteness::Open;
+            return Definiteness::Open { fits: 0.0 };
         };
         let form = (0..n * n).fold(Interval::point(0.0), |sum, at| {
             sum + self.value[at] * (Interval::point(direction[at / n]) * direction[at % n])
         });
         match form.hi() < 0.0 {
             true => Definiteness::Refuted { direction, value: form.hi() },
-            false => Definiteness::Open,
+            false => Definiteness::Open { fits: 0.0 },
         }
     }
 }

@@ -201,7 +201,8 @@ struct Matrices {
 fn matrices(governor: &Governor, motion: &Motion, plant: &dyn Plant, rho: Taylor) -> Matrices {
     let description = plant.description();
     let (n, m, d) = (description.states.len(), description.inputs.len(), governor.set_point_states.len());
-    let (a, b) = plant.linearization_over(rho);
+    let (x, u) = plant.trim_over(rho);
+    let (a, b) = plant.jacobians_over(&x, &u);
     let (a, b) = (TaylorMatrix::new(n, n, a), TaylorMatrix::new(n, m, b));
     let value = |function: &MatrixFunction| {
         let factors: Vec<Taylor> = function.basis.iter().map(|basis| basis.at(&[rho])).collect();
@@ -241,7 +242,7 @@ fn absorbed(design: &Design, level: f64, low: f64, high: f64) -> f64 {
     let identity = |n: usize, scale: f64| Mat::from_fn(n, n, |i, j| if i == j { scale } else { 0.0 });
     let n = design.weights.q.nrows();
     let positive = |middle: &TaylorMatrix, over: &TaylorMatrix, half: f64| {
-        matches!(CellMatrix::new(middle, Ok(over)).is_positive(half), Definiteness::Proved(_))
+        matches!(CellMatrix::new(middle, over).is_positive(half), Definiteness::Proved(_))
     };
     let constant_is_positive = |matrix: &Mat<f64>| {
         let matrix = TaylorMatrix::constant(matrix);

@@ -1,0 +1,255 @@
+//! Designs over a polytope of matrices: what `lpv design PROBLEM.toml --json` prints, or a file written by hand with K and P
+//! from elsewhere.
+
+use crate::failure::Failure;
+use crate::scenario::door::Door;
+use crate::scenario::engineers_words;
+use lpv::certificate::{Claim, PolytopicClaim, PolytopicLyapunov, prove_polytopic};
+use lpv::math::Mat;
+use lpv::math::matrix::{from_rows, inverse_spd, is_finite, is_symmetric};
+use lpv::model::Polytope;
+use lpv::synthesis::CostWeights;
+use lpv::synthesis::polytopic::InputBounds;
+use serde::Deserialize;
+
+type Rows = Vec<Vec<f64>>;
+/// Inputs of a high-gain design: there are 2^m mixtures.
+const MOST_HIGH_GAIN_INPUTS: usize = 10;
+/// Relative difference up to which a matrix is symmetric, and rates sum to zero.
+const TOLERANCE: f64 = 1e-9;
+
+/// The keys that a certificate reads; others, of the answer of `lpv design`, are let be.
+#[derive(Deserialize)]
+struct PolytopicFile {
+    lyapunov: Option<Kind>,
+    model: ModelTable,
+    model_hash: Option<String>,
+    weights: Option<WeightsTable>,
+    sigma: Option<Vec<f64>>,
+    gamma: Option<f64>,
+    rate_vertices: Option<Vec<Vec<f64>>>,
+    #[serde(rename = "K")]
+    k: Option<Matrices>,
+    #[serde(rename = "P")]
+    p: Option<Matrices>,
+    #[serde(rename = "Y")]
+    y: Option<Matrices>,
+    #[serde(rename = "L")]
+    l: Option<Matrices>,
+    #[serde(rename = "F")]
+    f: Option<Matrices>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Kind {
+    Common,
+    ParameterDependent,
+    Frozen,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ModelTable {
+    #[serde(rename = "A")]
+    a: Matrices,
+    #[serde(rename = "B")]
+    b: Matrices,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WeightsTable {
+    #[serde(rename = "Q")]
+    q: Rows,
+    #[serde(rename = "R")]
+    r: Rows,
+}
+
+/// One matrix as rows, or one for each vertex.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Matrices {
+    One(Rows),
+    Each(Vec<Rows>),
+}
+
+/// Whether the text is a design over a polytope rather than one of a plant: it has the key "model".
+pub fn is_polytopic(text: &str) -> bool {
+    serde_json::from_str::<serde_json::Map<String, serde_json::Value>>(text)
+        .is_ok_and(|map| map.contains_key("model") && !map.contains_key("points"))
+}
+
+/// Prove what the file claims; `region` replaces its γ.
+pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>, Failure> {
+    let file: PolytopicFile = serde_json::from_str(text).map_err(|error| Failure::Unreadable {
+        file: door.file.to_owned(),
+        message: format!("is not a design over a polytope: {}", engineers_words(&error.to_string())),
+    })?;
+    let (a, b) = (all(door, "model.A", &file.model.a)?, all(door, "model.B", &file.model.b)?);
+    let polytope = Polytope::new(a, b).or_else(|error| door.refuse("model", error.to_string()))?;
+    let fingerprint = polytope.fingerprint();
+    if let Some(hash) = file.model_hash.as_ref().filter(|&hash| *hash != fingerprint) {
+        return door.refuse(
+            "model_hash",
+            format!(
+                "is {hash:?}, and the model of the file has {fingerprint:?}: the design was made for another model"
+            ),
+        );
+    }
+    let (n, m, count) = (polytope.states(), polytope.inputs(), polytope.len());
+    let sized = |key: &str, given: &Option<Matrices>, [rows, columns]: [usize; 2]| {
+        let Some(given) = given else { return Ok(None) };
+        let mut each = all(door, key, given)?;
+        if each.len() == 1 {
+            each = vec![each[0].clone(); count];
+        }
+        if each.len() != count {
+            return door.refuse(key, format!("has {} matrices: give one, or {count}, one for each vertex", each.len()));
+        }
+        match each.iter().position(|matrix| (matrix.nrows(), matrix.ncols()) != (rows, columns)) {
+            None => Ok(Some(each)),
+            Some(at) => door.refuse(
+                format!("{key}[{}]", at + 1),
+                format!("is {} × {}: it has to be {rows} × {columns}", each[at].nrows(), each[at].ncols()),
+            ),
+        }
+    };
+    let symmetric = |key: &str, each: &[Mat<f64>]| match each.iter().position(|m| !is_symmetric(m, TOLERANCE)) {
+        None => Ok(()),
+        Some(at) => door.refuse(format!("{key}[{}]", at + 1), "has to be symmetric"),
+    };
+    let needed = |key: &str, given: Option<Vec<Mat<f64>>>| {
+        given.map_or_else(|| door.refuse(key, "is missing: without it there is nothing to certify"), Ok)
+    };
+    let weights = match &file.weights {
+        None => None,
+        Some(table) => Some(weights(door, table, n, m)?),
+    };
+    let saturation = saturation(door, &file, region, m)?;
+    let auxiliary_gain = sized("F", &file.f, [m, n])?;
+    if auxiliary_gain.is_some() && (m > MOST_HIGH_GAIN_INPUTS || saturation.is_none()) {
+        return door.refuse("F", format!("needs sigma and gamma, and at most {MOST_HIGH_GAIN_INPUTS} inputs"));
+    }
+    let p = sized("P", &file.p, [n, n])?;
+    let same = p.as_ref().is_some_and(|p| p.iter().all(|other| *other == p[0]));
+    let kind = match (file.lyapunov, &file.rate_vertices) {
+        (Some(kind), _) => kind,
+        (None, Some(_)) => Kind::ParameterDependent,
+        (None, None) => Kind::Common,
+    };
+    let claim = |polytope, lyapunov, auxiliary_gain| PolytopicClaim {
+        polytope,
+        lyapunov,
+        auxiliary_gain,
+        weights: weights.clone(),
+        saturation: saturation.clone(),
+    };
+    match kind {
+        Kind::ParameterDependent => {
+            let (y, l) = (needed("Y", sized("Y", &file.y, [n, n])?)?, needed("L", sized("L", &file.l, [m, n])?)?);
+            symmetric("Y", &y)?;
+            let rate_vertices = rates(door, &file, count)?;
+            let lyapunov = PolytopicLyapunov::ParameterDependent { y, l, rate_vertices };
+            Ok(prove_polytopic(&claim(polytope, lyapunov, auxiliary_gain)))
+        }
+        Kind::Common => {
+            let (p, gain) = (needed("P", p)?, needed("K", sized("K", &file.k, [m, n])?)?);
+            symmetric("P", &p)?;
+            if !same {
+                return door.refuse("P", "differs between vertices: give one for all, or lyapunov = \"parameter-dependent\" with Y, L and rate_vertices, or \"frozen\"");
+            }
+            let lyapunov = PolytopicLyapunov::Common { p: p[0].clone(), gain };
+            Ok(prove_polytopic(&claim(polytope, lyapunov, auxiliary_gain)))
+        }
+        Kind::Frozen => {
+            let (p, gain) = (needed("P", p)?, needed("K", sized("K", &file.k, [m, n])?)?);
+            symmetric("P", &p)?;
+            let at = |i: usize| {
+                let model = Polytope::hull(&[polytope.vertex(i)]);
+                let lyapunov = PolytopicLyapunov::Common { p: p[i].clone(), gain: vec![gain[i].clone()] };
+                let claims =
+                    prove_polytopic(&claim(model, lyapunov, auxiliary_gain.as_ref().map(|f| vec![f[i].clone()])));
+                let place =
+                    if count > 1 { format!(", at point {} with the parameter at rest", i + 1) } else { String::new() };
+                claims.into_iter().map(move |claim| Claim { claim: format!("{}{place}", claim.claim), ..claim })
+            };
+            Ok((0..count).flat_map(at).collect())
+        }
+    }
+}
+
+fn all(door: &Door, key: &str, given: &Matrices) -> Result<Vec<Mat<f64>>, Failure> {
+    let (each, single): (Vec<&Rows>, bool) = match given {
+        Matrices::One(rows) => (vec![rows], true),
+        Matrices::Each(each) => (each.iter().collect(), false),
+    };
+    let matrix = |(i, rows): (usize, &&Rows)| {
+        let key = if single { key.to_owned() } else { format!("{key}[{}]", i + 1) };
+        matrix(door, &key, rows)
+    };
+    each.iter().enumerate().map(matrix).collect()
+}
+
+fn matrix(door: &Door, key: &str, rows: &Rows) -> Result<Mat<f64>, Failure> {
+    let width = rows.first().map_or(0, Vec::len);
+    if width == 0 || rows.iter().any(|row| row.len() != width) {
+        return door.refuse(key, "has to be rows of equally many numbers");
+    }
+    let matrix = from_rows(rows);
+    if !is_finite(&matrix) {
+        return door.refuse(key, "has an entry that is not finite");
+    }
+    Ok(matrix)
+}
+
+fn weights(door: &Door, table: &WeightsTable, n: usize, m: usize) -> Result<CostWeights, Failure> {
+    let sized = |key: &str, rows: &Rows, size: usize| {
+        let matrix = matrix(door, key, rows)?;
+        match (matrix.nrows(), matrix.ncols()) == (size, size) && is_symmetric(&matrix, TOLERANCE) {
+            true => Ok(matrix),
+            false => door.refuse(key, format!("has to be a symmetric {size} × {size} matrix")),
+        }
+    };
+    let (q, r) = (sized("weights.Q", &table.q, n)?, sized("weights.R", &table.r, m)?);
+    if inverse_spd(&r).is_none() {
+        return door.refuse("weights.R", "has to be positive definite");
+    }
+    Ok(CostWeights { q, r })
+}
+
+fn saturation(
+    door: &Door,
+    file: &PolytopicFile,
+    region: Option<f64>,
+    m: usize,
+) -> Result<Option<InputBounds>, Failure> {
+    let (sigma, gamma) = match (&file.sigma, region.or(file.gamma)) {
+        (None, None) => return Ok(None),
+        (Some(sigma), Some(gamma)) => (sigma, door.positive("gamma", gamma)?),
+        (None, _) => {
+            return door.refuse("sigma", "is missing: gamma and --region are levels of a set on which |u| <= sigma");
+        }
+        (_, None) => return door.refuse("gamma", "is missing: sigma holds on a set V <= gamma"),
+    };
+    if sigma.len() != m {
+        return door.refuse("sigma", format!("has {} numbers: the model has {m} inputs", sigma.len()));
+    }
+    sigma.iter().try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
+    Ok(Some(InputBounds { sigma: sigma.clone(), gamma }))
+}
+
+fn rates(door: &Door, file: &PolytopicFile, count: usize) -> Result<Vec<Vec<f64>>, Failure> {
+    let Some(vertices) = file.rate_vertices.as_ref().filter(|vertices| !vertices.is_empty()) else {
+        return door
+            .refuse("rate_vertices", "is missing: V that depends on the parameter holds for a rate; [[0, …]] is rest");
+    };
+    for (k, nu) in vertices.iter().enumerate() {
+        let largest = nu.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        if nu.len() != count || !largest.is_finite() || nu.iter().sum::<f64>().abs() > TOLERANCE * largest {
+            let message = format!("is {nu:?}: it has to be {count} finite numbers that sum to zero");
+            return door.refuse(format!("rate_vertices[{}]", k + 1), message);
+        }
+    }
+    Ok(vertices.clone())
+}
