@@ -173,9 +173,10 @@ impl Segment {
             let x = lyapunov::solve(&(&model.a - &model.b * k), &stage)?;
             Some(trace(&(x * &y0)) / y0.nrows() as f64)
         };
-        // ten to a decade: the choice is flat, and a grid makes it the same at points that differ by rounding only
-        let candidates: Vec<(f64, f64)> = (-40..=0)
-            .map(|k| 10f64.powf(f64::from(k) / 10.0))
+        // ten to a decade: the choice is flat, and a grid makes it the same at points that differ by rounding only. The low gain
+        // itself is the last resort of a slow sampler
+        let candidates: Vec<(f64, f64)> = std::iter::once(0.0)
+            .chain((-40..=0).map(|k| 10f64.powf(f64::from(k) / 10.0)))
             .filter_map(|s| {
                 let k = self.gain(s);
                 (sampled_is_stable(&k, 1.0) && sampled_is_stable(&k, options.gain_margin)).then_some((s, cost(&k)?))

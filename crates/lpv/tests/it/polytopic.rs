@@ -206,3 +206,27 @@ fn high_gain_with_a_general_r() {
         assert!(largest < 1e-6, "mixture {vertex}: {largest}");
     }
 }
+
+/// The centre of the yaw circle is in the hull of any points around it: no input moves roll and pitch there (w = e_φ or e_θ, or
+/// between), and no number of points helps.
+#[test]
+fn no_stabilisation_on_the_whole_circle() {
+    for count in [3, 4, 5, 8, 12] {
+        let circle = Polytope::hull(&GridModel::of_plant(&*plant(), count).points);
+        for weights in [None, Some(quadrotor_weights())] {
+            let design = synthesize(&circle, &PolytopicRequest { weights, ..request(quadrotor_weights()) }).unwrap();
+            assert!(design.is_infeasible() && design.solution.is_none(), "{count} points");
+            let point = design.unstabilizable.unwrap();
+            let model = circle.at(&point.weights);
+            let w = &point.direction;
+            let along = |matrix: &Mat<f64>| {
+                (0..matrix.ncols())
+                    .map(|j| (0..12).map(|i| w[i] * matrix[(i, j)]).sum::<f64>().abs())
+                    .fold(0.0, f64::max)
+            };
+            assert!(point.weights.iter().all(|&weight| weight >= 0.0) && point.eigenvalue.abs() < 1e-9);
+            assert!(along(&model.a) < 1e-9 && along(&model.b) < 1e-9, "wᵀA = 0 and wᵀB = 0");
+            assert!((w[9].hypot(w[10]) - 1.0).abs() < 1e-9, "roll and pitch: {w:?}");
+        }
+    }
+}
