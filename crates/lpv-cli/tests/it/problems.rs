@@ -86,7 +86,7 @@ fn slow_sampling() {
         edited(DOUBLE_INTEGRATOR, "high_gain = true", &format!("high_gain = true\nsample_time_s = {time}"))
     };
     for time in ["100", "1e308"] {
-        Place::with(&sampled(time))
+        Place::with(sampled(time))
             .lpv("design scenario.toml")
             .refuses(3, &["no gain", "sample faster", "operating point"]);
     }
