@@ -297,23 +297,31 @@ fn verdict(plan: &ProblemPlan, design: &PolytopicDesign, inside: Option<bool>) -
 fn unstabilizable(plan: &ProblemPlan, point: &UnstabilizablePoint) -> String {
     let part = |(k, &w): (usize, &f64)| {
         let name = plan.states.get(k).cloned().unwrap_or_else(|| format!("x{}", k + 1));
-        (w.abs() > 1e-6).then(|| format!("{w:.6} {name}"))
+        let v = point.direction_imaginary.get(k).copied().unwrap_or(0.0);
+        match (w.abs() > 1e-6, v.abs() > 1e-6) {
+            (false, false) => None,
+            (_, false) => Some(format!("{w:.6} {name}")),
+            (_, true) => Some(format!("({w:.6} {v:+.6}i) {name}")),
+        }
     };
     let mode: Vec<String> = point.direction.iter().enumerate().filter_map(part).collect();
     let near: Vec<String> = (point.weights.iter().zip(&plan.places))
         .filter(|&(&weight, _)| weight > 1e-3)
         .map(|(weight, place)| format!("{weight:.4} × {place}"))
         .collect();
-    let place = match plan.scope {
-        _ if point.weights.len() == 1 => "".to_owned(),
-        _ if near.len() == 1 => format!(" at {}", near[0].trim_start_matches("1.0000 × ")),
-        _ => format!(" at a point that the polytope holds, {},", near.join(" + ")),
-    };
-    format!(
-        "no input moves the mode {}, which does not decay (λ = {:.3e}){place}: no gain stabilises it there, and no finer division of the polytope helps",
-        mode.join(" + "),
-        if point.eigenvalue.abs() < 1e-9 { 0.0 } else { point.eigenvalue }
-    )
+    let [re, im] = point.eigenvalue.map(|part| if part.abs() < 1e-9 { 0.0 } else { part });
+    let eigenvalue = if im == 0.0 { format!("{re:.3e}") } else { format!("{re:.3e} ± {:.3e}i", im.abs()) };
+    let which = format!("no input moves the mode {}, which does not decay (λ = {eigenvalue})", mode.join(" + "));
+    match plan.scope {
+        _ if point.weights.len() == 1 => format!("{which}: no gain stabilises it"),
+        _ if near.len() == 1 => {
+            format!("{which}, at {}: no gain stabilises it there", near[0].trim_start_matches("1.0000 × "))
+        }
+        _ => format!(
+            "{which}, at a point that the polytope holds, {}: no gain stabilises it there, and no finer division of the polytope helps",
+            near.join(" + ")
+        ),
+    }
 }
 
 /// The name that serde gives it.
@@ -323,10 +331,14 @@ fn word(theorem: &Theorem) -> String {
 
 fn witness(design: &PolytopicDesign) -> Option<Vec<NamedMultiplier>> {
     let answer = &design.answer;
-    if let Some(UnstabilizablePoint { weights, direction: w, .. }) = &design.unstabilizable {
+    if let Some(UnstabilizablePoint { weights, direction: w, direction_imaginary: v, .. }) = &design.unstabilizable {
         let name =
             |i: usize| if weights.len() == 1 { "stability".into() } else { format!("stability at vertex {}", i + 1) };
-        let multiplier = |share: f64| w.iter().map(|a| w.iter().map(|b| share * a * b).collect()).collect();
+        let imaginary = |i: usize| v.get(i).copied().unwrap_or(0.0);
+        let entry = |i: usize, j: usize| w[i] * w[j] + imaginary(i) * imaginary(j);
+        let multiplier = |share: f64| -> Rows {
+            (0..w.len()).map(|i| (0..w.len()).map(|j| share * entry(i, j)).collect()).collect()
+        };
         let each = |(i, &share): (usize, &f64)| NamedMultiplier { name: name(i), multiplier: multiplier(share) };
         return Some(weights.iter().enumerate().map(each).collect());
     }
@@ -358,7 +370,7 @@ impl Report {
             }
         }
         if let Some(s) = &self.s {
-            line("s", s.iter().map(|s| format!("{s:.6}")).collect::<Vec<_>>().join(", "));
+            line("s", s.iter().map(|s| format!("{s:.4e}")).collect::<Vec<_>>().join(", "));
         }
         if let Some(cost) = self.guaranteed_cost {
             line("guaranteed cost", format!("{cost:.6}  ({})", self.verdict.word()));
@@ -389,7 +401,10 @@ impl Report {
 
     /// What to relax, or which inequalities contradict each other.
     fn relaxation(&self) -> String {
-        if self.unstabilizable.is_some() {
+        if let Some(point) = &self.unstabilizable {
+            if point.weights.iter().filter(|&&weight| weight > 1e-3).count() == 1 {
+                return "; it needs an input there".into();
+            }
             return "; leave that point out of the polytope: a smaller range, or vertices around the trajectories alone".into();
         }
         let Some(explanation) = &self.explanation else { return String::new() };

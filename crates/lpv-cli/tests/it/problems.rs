@@ -75,7 +75,9 @@ fn a_model_without_stabilising_input() {
     for lyapunov in ["common", "frozen"] {
         let text = edited(DOUBLE_INTEGRATOR, "A = [[0, 1], [0, 0]]", "A = [[1, 0], [0, -1]]");
         let text = edited(&text, "method = \"slqr\"", &format!("method = \"slqr\"\nlyapunov = \"{lyapunov}\""));
-        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "1.000000 x1"]);
+        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "1.000000 x1", "needs an input"]);
+        let text = edited(&text, "A = [[1, 0], [0, -1]]\nB = [[0], [1]]", "A = [[0, 2], [-2, 0]]\nB = [[0], [0]]");
+        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "± 2.000e0i"]);
     }
 }
 

@@ -41,7 +41,7 @@ fn the_thesis_is_recomputed() {
         (1, "High-gain SLQR, γ = 1", "actual cost", 12.985, 1e-3),
         (1, "High-gain SLQR, γ = 60", "actual cost", 14.16, 1e-2),
         (2, "K(ψ) as printed, at ψ = 0", "max Re λ", 3.263, 1e-3),
-        (2, "the same, columns", "max Re λ", -0.7071, 1e-4),
+        (2, "the same, columns", "max Re λ", -0.70705, 1e-4),
         (2, "K(ψ) as printed, at ψ + π", "from the Riccati gain", 0.0, 5e-6),
         (2, "Theorem 4.1, yaw within ±30°", "largest margin, tr Y = 12", 0.5115, 1e-4),
         (2, "Theorem 4.1, yaw within ±60°", "largest margin, tr Y = 12", 0.2360, 1e-4),

@@ -1,6 +1,6 @@
 //! Points of a polytope that no input can stabilise, which refute every theorem for the polytope at once.
 //!
-//! Let wᵀA(ρ) = λwᵀ with λ ≥ 0 and wᵀB(ρ) = 0 at one ρ of the polytope. Then wᵀ(A(ρ)Y + YA(ρ)ᵀ − B(ρ)L − LᵀB(ρ)ᵀ)w = 2λwᵀYw ≥ 0 for
+//! Let w*A(ρ) = λw* with Re λ ≥ 0 and w*B(ρ) = 0 at one ρ of the polytope. Then w*(A(ρ)Y + YA(ρ)ᵀ − B(ρ)L − LᵀB(ρ)ᵀ)w = 2 Re λ w*Yw ≥ 0 for
 //! every Y ≻ 0 and L: no Lyapunov function exists at a resting ρ, and no finer division of the polytope helps. On the yaw circle
 //! of the quadrotor this is the centre, where w = e_φ. A solver meets it as an infimum that is not reached and stops short
 //! between rounding errors; here the multipliers Zᵢⱼ of its last iterate are read instead: Zᵢⱼ ≈ ρᵢρⱼwwᵀ.
@@ -16,11 +16,14 @@ use serde::Serialize;
 pub struct UnstabilizablePoint {
     /// ρ, convex weights of the vertices.
     pub weights: Vec<f64>,
-    /// λ ≥ 0, up to rounding.
-    pub eigenvalue: f64,
-    /// w, of unit length: wᵀA(ρ) = λwᵀ, wᵀB(ρ) = 0.
+    /// λ, real and imaginary part; Re λ ≥ 0 up to rounding.
+    pub eigenvalue: [f64; 2],
+    /// Real part of w, ‖w‖ = 1: w*A(ρ) = λw*, w*B(ρ) = 0.
     pub direction: Vec<f64>,
-    /// ‖wᵀ[A(ρ) − λI, B(ρ)]‖, at most 10⁻¹⁰ of ‖[A, B]‖: what rounding of the model's entries is allowed to hide.
+    /// Imaginary part of w; empty for a real λ.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub direction_imaginary: Vec<f64>,
+    /// ‖w*[A(ρ) − λI, B(ρ)]‖, at most 10⁻¹⁰ of ‖[A, B]‖: what rounding of the model's entries is allowed to hide.
     pub residual: f64,
 }
 
@@ -35,11 +38,10 @@ const DAMPING: f64 = 1e-6;
 /// A vertex that cannot be stabilised.
 pub(super) fn vertex(polytope: &Polytope) -> Option<UnstabilizablePoint> {
     (0..polytope.len()).find_map(|i| {
-        // of complex pairs the decision is taken here too, but they have no real w
         let (re, im) = unstabilizable_mode(polytope.a(i), polytope.b(i))?;
         let mut weights = vec![0.0; polytope.len()];
         weights[i] = 1.0;
-        (im == 0.0).then(|| at(polytope, &weights, re)).flatten().filter(|point| holds(polytope, point))
+        at(polytope, &weights, [re, im]).filter(|point| holds(polytope, point))
     })
 }
 
@@ -73,19 +75,34 @@ pub(super) fn point(
         // eigenvalues of a defective A(ρ), which double integrators make, are no better than roots of rounding errors: zero is tried too
         let real = eigenvalues(&model.a).into_iter().filter(|&(_, im)| im == 0.0).map(|(re, _)| re);
         let tried = [0.0, quadratic_form(&model.a, &w)].into_iter().chain(real);
-        best = (tried.filter_map(|eigenvalue| at(polytope, &weights, eigenvalue)))
+        best = (tried.filter_map(|eigenvalue| at(polytope, &weights, [eigenvalue, 0.0])))
             .min_by(|a, b| a.residual.total_cmp(&b.residual));
         w.clone_from(&best.as_ref()?.direction);
     }
     best.filter(|point| holds(polytope, point))
 }
 
-/// [A − λI, B]
-fn pencil(a: &Mat<f64>, b: &Mat<f64>, eigenvalue: f64) -> Mat<f64> {
-    let n = a.nrows();
-    Mat::from_fn(n, n + b.ncols(), |i, j| match j < n {
-        true => a[(i, j)] - if i == j { eigenvalue } else { 0.0 },
-        false => b[(i, j - n)],
+/// [A − λI, B]; for complex λ = μ + iν the real [A − μI, νI, B, 0; −νI, A − μI, 0, B], which (Re w, Im w) is multiplied with from the left.
+fn pencil(a: &Mat<f64>, b: &Mat<f64>, [re, im]: [f64; 2]) -> Mat<f64> {
+    let (n, m) = (a.nrows(), b.ncols());
+    let shifted = |i: usize, j: usize| a[(i, j)] - if i == j { re } else { 0.0 };
+    if im == 0.0 {
+        return Mat::from_fn(n, n + m, |i, j| if j < n { shifted(i, j) } else { b[(i, j - n)] });
+    }
+    Mat::from_fn(2 * n, 2 * (n + m), |i, j| {
+        let (lower, i) = (i >= n, i % n);
+        match j {
+            _ if j < 2 * n && (j >= n) == lower => shifted(i, j % n),
+            _ if j < 2 * n && i == j % n => {
+                if lower {
+                    -im
+                } else {
+                    im
+                }
+            }
+            _ if j >= 2 * n && (j - 2 * n >= m) == lower => b[(i, (j - 2 * n) % m)],
+            _ => 0.0,
+        }
     })
 }
 
@@ -118,18 +135,25 @@ fn moved(polytope: &Polytope, weights: &[f64], w: &[f64]) -> Option<Vec<f64>> {
 }
 
 /// The w that `eigenvalue` is nearest to a mode without input with.
-fn at(polytope: &Polytope, weights: &[f64], eigenvalue: f64) -> Option<UnstabilizablePoint> {
+fn at(polytope: &Polytope, weights: &[f64], eigenvalue: [f64; 2]) -> Option<UnstabilizablePoint> {
     let model = polytope.at(weights);
     let pencil = pencil(&model.a, &model.b, eigenvalue);
-    let direction = smallest_singular_vector(&pencil)?;
-    let product = |j: usize| -> f64 { direction.iter().enumerate().map(|(i, w)| w * pencil[(i, j)]).sum() };
+    let w = smallest_singular_vector(&pencil)?;
+    let product = |j: usize| -> f64 { w.iter().enumerate().map(|(i, w)| w * pencil[(i, j)]).sum() };
     let residual = (0..pencil.ncols()).map(|j| product(j).powi(2)).sum::<f64>().sqrt();
-    Some(UnstabilizablePoint { weights: weights.to_vec(), eigenvalue, direction, residual })
+    let (real, imaginary) = w.split_at(polytope.states());
+    Some(UnstabilizablePoint {
+        weights: weights.to_vec(),
+        eigenvalue,
+        direction: real.to_vec(),
+        direction_imaginary: imaginary.to_vec(),
+        residual,
+    })
 }
 
 /// Whether the mode neither decays nor is moved.
 fn holds(polytope: &Polytope, point: &UnstabilizablePoint) -> bool {
     let model = polytope.at(&point.weights);
     let scale = model.a.norm_l2().max(model.b.norm_l2());
-    point.residual <= RESIDUAL * scale && point.eigenvalue >= -DECAY * scale
+    point.residual <= RESIDUAL * scale && point.eigenvalue[0] >= -DECAY * scale
 }
