@@ -69,7 +69,11 @@ mod tests {
         assert_eq!(ticks([-0.2, 1.05], 5), [0.0, 0.5, 1.0]);
         assert_eq!(tick_labels(&ticks([-0.2, 1.05], 5)), ["0.0", "0.5", "1.0"]);
         assert_eq!(tick_labels(&ticks([-3.0, 3.0], 4)), ["−2", "0", "2"]);
-        assert_eq!(tick_labels(&ticks([-0.047, 0.047], 3)), ["−0.02", "0.00", "0.02"], "not zero alone");
+        assert_eq!(
+            tick_labels(&ticks([-0.047, 0.047], 3)),
+            ["−0.04", "−0.02", "0.00", "0.02", "0.04"],
+            "not zero alone"
+        );
         assert_eq!(ticks([0.0, 60.0], 6), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
     }
 
