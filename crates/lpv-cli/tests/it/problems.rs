@@ -93,7 +93,7 @@ fn slow_sampling() {
             .refuses(3, &["no gain", "sample faster", "operating point"]);
     }
     let [fast, slow] = ["0.001", "2"].map(|time| answer(&sampled(time))["s"][0].as_f64().unwrap());
-    assert!(fast > slow && slow == 0.0, "{fast}, {slow}");
+    assert!(fast > 1e-3 && slow < 1e-4, "{fast}, {slow}");
 }
 
 /// The answer names its theorem.
