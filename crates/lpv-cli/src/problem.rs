@@ -10,7 +10,6 @@ use crate::scenario::door::Door;
 use crate::scenario::{file as scenario_file, weights};
 use file::{DesignTable, LyapunovName, Matrices, MethodName, ModelTable, ObjectiveName, ProblemFile};
 use lpv::math::Mat;
-use lpv::math::eigen::unstabilizable_mode;
 use lpv::math::matrix::{from_rows, inverse_spd, is_symmetric};
 use lpv::model::{FrozenModel, GridModel, Polytope, linearize};
 use lpv::synthesis::polytopic::{HighGain, InputBounds, Lyapunov, Objective, rate_box_vertices};
@@ -33,6 +32,8 @@ const SUM_TOLERANCE: f64 = 1e-9;
 pub struct ProblemPlan {
     /// What the vertices or grid points are called in the answer.
     pub places: Vec<String>,
+    /// Names of the states, where the plant has them.
+    pub states: Vec<String>,
     /// The models: vertices, or points of a frozen design.
     pub models: Vec<FrozenModel>,
     /// How they are used.
@@ -100,7 +101,7 @@ impl ProblemPlan {
         let weights = cost_weights(&door, file.weights, design.method, n, m)?;
         let saturation = saturation(&door, &design, m)?;
         let high_gain = high_gain(&door, &design, m)?;
-        let (objective, region) = objective(&door, &design, n, lyapunov, saturation.is_some())?;
+        let (objective, region) = objective(&door, &design, n, saturation.is_some())?;
         let scope = match lyapunov {
             LyapunovName::Frozen => Scope::Frozen,
             LyapunovName::Common => Scope::Polytope(Lyapunov::Common),
@@ -119,6 +120,9 @@ impl ProblemPlan {
         }
         let initial = initial(&door, &design, &source, lyapunov)?;
         let mut plan = Self {
+            states: source.plant.as_ref().map_or(Vec::new(), |plant| {
+                plant.description().states.iter().map(|state| state.name.clone()).collect()
+            }),
             places: source.places,
             models: source.models,
             scope,
@@ -136,7 +140,6 @@ impl ProblemPlan {
             parameter.clone_from(given);
         }
         plan.check_size(&door)?;
-        plan.check_stabilizable(&door)?;
         Ok(plan)
     }
 
@@ -158,22 +161,6 @@ impl ProblemPlan {
         }
         Ok(())
     }
-
-    /// A regulator needs a pair (A, B) that can be stabilised at every model; that none exists is no outcome of a solver.
-    fn check_stabilizable(&self, door: &Door) -> Result<(), Failure> {
-        if self.weights.is_none() || matches!(self.scope, Scope::Polytope(_)) {
-            return Ok(());
-        }
-        for (model, place) in self.models.iter().zip(&self.places) {
-            if let Some((re, im)) = unstabilizable_mode(&model.a, &model.b) {
-                return door.refuse(
-                    "model",
-                    format!("the pair (A, B) at {place} is not stabilisable: no input moves the mode {re:.4} {im:+.4}i, which does not decay by itself"),
-                );
-            }
-        }
-        Ok(())
-    }
 }
 
 /// The models of a file, before it is known what for.
@@ -188,12 +175,6 @@ struct Source {
 fn lyapunov(door: &Door, design: &DesignTable, model: &ModelTable, has_plant: bool) -> Result<LyapunovName, Failure> {
     let is_plant = has_plant || model.plant.is_some();
     let lyapunov = design.lyapunov.unwrap_or(if is_plant { LyapunovName::Frozen } else { LyapunovName::Common });
-    if lyapunov == LyapunovName::ParameterDependent && is_plant {
-        return door.refuse(
-            "design.lyapunov",
-            "\"parameter-dependent\" is for a model of matrices; for a plant over a range of its parameter write a scenario whose controller has rate_bound",
-        );
-    }
     if design.lyapunov_order.is_some() {
         return door.refuse(
             "design.lyapunov_order",
@@ -282,9 +263,9 @@ fn plant_models(door: &Door, model: ModelTable, table: toml::Table) -> Result<So
     if !(2..=512).contains(&count) {
         return door.refuse("model.grid_points", format!("is {count}: allowed are 2 to 512"));
     }
-    let models = match model.range {
+    let models = match model.range.as_deref() {
         None => GridModel::of_plant(&*plant, count).points,
-        Some([low, high]) => {
+        Some(&[low, high]) => {
             let [least, most] = scheduling.range;
             let inside =
                 low < high && (scheduling.periodic || (low >= least && high <= most)) && high - low <= most - least;
@@ -298,6 +279,10 @@ fn plant_models(door: &Door, model: ModelTable, table: toml::Table) -> Result<So
                 );
             }
             (0..count).map(|k| linearize(&*plant, low + (high - low) * k as f64 / (count - 1) as f64)).collect()
+        }
+        Some(other) => {
+            return door
+                .refuse("model.range", format!("has {} numbers: it has two, the least and the largest", other.len()));
         }
     };
     let places = models.iter().map(|model| format!("{} = {:.6}", scheduling.parameter, model.rho)).collect();
@@ -415,13 +400,7 @@ fn high_gain(door: &Door, design: &DesignTable, m: usize) -> Result<Option<HighG
     Ok(Some(HighGain { options: HighGainOptions { recovery, gain_margin }, sample_time_s }))
 }
 
-fn objective(
-    door: &Door,
-    design: &DesignTable,
-    n: usize,
-    lyapunov: LyapunovName,
-    saturated: bool,
-) -> Result<(Objective, bool), Failure> {
+fn objective(door: &Door, design: &DesignTable, n: usize, saturated: bool) -> Result<(Objective, bool), Failure> {
     let name = design.objective;
     if design.method == MethodName::Stabilize && name != ObjectiveName::Trace {
         return door.refuse("design.objective", "method \"stabilize\" has its own: the largest margin; remove it");
@@ -453,27 +432,33 @@ fn objective(
         ObjectiveName::Trace => Ok((Objective::Trace, false)),
         ObjectiveName::InitialState => match &design.initial_state {
             None => door.refuse("design.initial_state", "is missing: objective = \"initial-state\" is its cost bound"),
-            Some(_) if lyapunov == LyapunovName::Frozen => door.refuse(
-                "design.objective",
-                "\"initial-state\" is for one Lyapunov function; frozen designs have one for each point: choose \"trace\"",
-            ),
             Some(x) => Ok((checked("initial_state", &vec![x.clone()])?, false)),
         },
         ObjectiveName::WorstCase => match (&design.initial_states, &design.ellipsoid) {
             (Some(_), Some(_)) => door.refuse("design.ellipsoid", "and initial_states are both given; keep one"),
-            (None, None) => door.refuse("design.initial_states", "is missing: objective = \"worst-case\" needs initial_states or ellipsoid"),
+            (None, None) => door.refuse(
+                "design.initial_states",
+                "is missing: objective = \"worst-case\" needs initial_states or ellipsoid",
+            ),
             (Some(states), None) => Ok((checked("initial_states", states)?, false)),
             (None, Some(rows)) => {
                 let shape = matrix(door, "design.ellipsoid", rows)?;
-                if (shape.nrows(), shape.ncols()) != (n, n) || !is_symmetric(&shape, 1e-12) || inverse_spd(&shape).is_none() {
-                    let message = format!("has to be a symmetric positive definite {n} × {n} matrix S: the states xᵀSx ≤ 1");
+                if (shape.nrows(), shape.ncols()) != (n, n)
+                    || !is_symmetric(&shape, 1e-12)
+                    || inverse_spd(&shape).is_none()
+                {
+                    let message =
+                        format!("has to be a symmetric positive definite {n} × {n} matrix S: the states xᵀSx ≤ 1");
                     return door.refuse("design.ellipsoid", message);
                 }
                 Ok((Objective::Ellipsoid { shape }, false))
             }
         },
         ObjectiveName::Region => match &design.directions {
-            _ if !saturated => door.refuse("design.objective", "\"region\" is for the methods \"slqr\" and \"slpvqr\": without saturation everything is certified"),
+            _ if !saturated => door.refuse(
+                "design.objective",
+                "\"region\" is for the methods \"slqr\" and \"slpvqr\": without saturation everything is certified",
+            ),
             None => door.refuse("design.directions", "is missing: objective = \"region\" is the reach along them"),
             Some(states) => Ok((checked("directions", states)?, true)),
         },
@@ -533,6 +518,18 @@ fn state_like(door: &Door, key: &str, values: &[f64], count: usize) -> Result<()
     values.iter().try_for_each(|&value| door.finite(key, value).map(|_| ()))
 }
 
+/// Convex weights of the ascending `grid` at `rho`, of its two neighbours; `None` outside.
+fn weights_between(grid: &[f64], rho: f64) -> Option<Vec<f64>> {
+    let right = (1..grid.len()).find(|&k| grid[k - 1] <= rho && rho <= grid[k])?;
+    let share = (rho - grid[right - 1]) / (grid[right] - grid[right - 1]);
+    let weight = |k: usize| match k {
+        _ if k == right => share,
+        _ if k + 1 == right => 1.0 - share,
+        _ => 0.0,
+    };
+    Some((0..grid.len()).map(weight).collect())
+}
+
 fn initial(
     door: &Door,
     design: &DesignTable,
@@ -561,9 +558,23 @@ fn initial(
             (Some(weights.clone()), model)
         }
         (Some(value), None, Some(plant)) => match (value.as_slice(), &plant.description().scheduling) {
-            ([rho], Some(_)) if rho.is_finite() => {
-                (None, (lyapunov == LyapunovName::Frozen).then(|| linearize(&**plant, *rho)))
-            }
+            ([rho], Some(scheduling)) if rho.is_finite() => match lyapunov {
+                LyapunovName::Common => (None, None),
+                LyapunovName::Frozen => (None, Some(linearize(&**plant, *rho))),
+                LyapunovName::ParameterDependent => {
+                    let grid: Vec<f64> = source.models.iter().map(|model| model.rho).collect();
+                    let Some(weights) = weights_between(&grid, *rho) else {
+                        let message = format!(
+                            "is {rho}: {} of the model's grid is from {} to {}",
+                            scheduling.parameter,
+                            grid[0],
+                            grid[grid.len() - 1]
+                        );
+                        return door.refuse(key, message);
+                    };
+                    (Some(weights), None)
+                }
+            },
             (_, Some(scheduling)) => {
                 return door.refuse(key, format!("has to be one finite number, {}", scheduling.parameter));
             }

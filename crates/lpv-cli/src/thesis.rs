@@ -2,6 +2,7 @@
 
 mod comparison;
 mod errata;
+mod numbers;
 mod pendulum;
 mod phase_plane;
 mod quadrotor;
@@ -14,7 +15,8 @@ use crate::folder::ResultFolder;
 use crate::output::print;
 use clap::Args;
 use comparison::Table;
-use errata::ERRATA;
+use errata::{Erratum, errata};
+use quadrotor::Fleet;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -36,6 +38,7 @@ pub struct ThesisArguments {
 #[derive(Serialize)]
 struct Record<'a> {
     tables: &'a [Table],
+    errata: &'a [Erratum],
     figures: Vec<&'static str>,
 }
 
@@ -43,20 +46,26 @@ struct Record<'a> {
 pub fn run(arguments: &ThesisArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let folder = ResultFolder::begin(&arguments.out, arguments.force)?;
-    let ((pendulum, integrator), quadrotor) =
-        rayon::join(|| rayon::join(pendulum::chapter, saturated_integrator::chapter), quadrotor::figures);
-    let ((table_4, figures_4), (table_5, figures_5)) = (pendulum?, integrator?);
-    let mut figures = quadrotor?;
+    let vehicle = || {
+        let fleet = Fleet::new()?;
+        let (figures, numbers) = rayon::join(|| quadrotor::figures(&fleet), || numbers::chapter(&fleet));
+        Ok::<_, Failure>((figures?, numbers?))
+    };
+    let ((pendulum, integrator), vehicle) =
+        rayon::join(|| rayon::join(pendulum::chapter, saturated_integrator::chapter), vehicle);
+    let ((table_4, figures_4), (table_5, figures_5), (mut figures, table_6)) = (pendulum?, integrator?, vehicle?);
     let later = figures.split_off(1);
     figures.extend(figures_4.into_iter().chain(figures_5).chain(later));
-    let tables = [table_4, table_5];
+    let tables = [table_4, table_5, table_6];
+    let errata = errata(&tables);
     let seconds = started.elapsed().as_secs_f64();
 
     for figure in &figures {
         folder.write(&figure.file_name(), figure.svg(true).as_bytes())?;
     }
-    folder.write("report.html", page(&tables, &figures, seconds).as_bytes())?;
-    let record = Record { tables: &tables, figures: figures.iter().map(|figure| figure.number).collect() };
+    folder.write("report.html", page(&tables, &errata, &figures, seconds).as_bytes())?;
+    let record =
+        Record { tables: &tables, errata: &errata, figures: figures.iter().map(|figure| figure.number).collect() };
     let json = serde_json::to_string_pretty(&record).map_err(|error| Failure::serialisation(&error))?;
     folder.write("tables.json", json.as_bytes())?;
     let place = folder.finish()?;
@@ -72,7 +81,7 @@ fn text(table: &Table) -> String {
     let mut text = format!("Table {}: {}\n", table.number, table.title);
     for entry in &table.entries {
         text.push_str(&format!(
-            "  {:30} {:16} thesis {:>9}  right {:>9}  {}\n",
+            "  {:46} {:26} thesis {:>9}  right {:>11}  {}\n",
             entry.row,
             entry.quantity,
             entry.shown_printed(),
@@ -86,7 +95,7 @@ fn text(table: &Table) -> String {
 
 const PAGE_STYLE: &str = include_str!("thesis/page.css");
 
-fn page(tables: &[Table], figures: &[Figure], seconds: f64) -> String {
+fn page(tables: &[Table], errata: &[Erratum], figures: &[Figure], seconds: f64) -> String {
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>The thesis, recomputed</title>\n<style>{PAGE_STYLE}{STYLE}</style>\n<main>\n<h1>The thesis, recomputed</h1>\n\
@@ -121,13 +130,8 @@ fn page(tables: &[Table], figures: &[Figure], seconds: f64) -> String {
         html.push_str("</table></div>\n");
     }
     html.push_str("<h2 id=\"errata\">Errata</h2>\n<div class=\"wide\"><table>\n<tr><th>Where<th>Thesis printed<th>Right is</tr>\n");
-    for erratum in ERRATA {
-        html.push_str(&format!(
-            "<tr><td>{}<td>{}<td>{}</tr>\n",
-            escaped(erratum.place),
-            escaped(erratum.printed),
-            escaped(erratum.right)
-        ));
+    for Erratum { place, printed, right } in errata {
+        html.push_str(&format!("<tr><td>{}<td>{}<td>{}</tr>\n", escaped(place), escaped(printed), escaped(right)));
     }
     html.push_str("</table></div>\n<h2 id=\"figures\">Figures</h2>\n");
     for figure in figures {

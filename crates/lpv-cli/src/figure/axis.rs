@@ -21,8 +21,13 @@ impl Axis {
     }
 }
 
-/// Round values in `range`, about `count` of them: multiples of 1, 2 or 5 times a power of ten.
-pub(super) fn ticks([low, high]: [f64; 2], count: usize) -> Vec<f64> {
+/// Round values in `range`, about `count` of them and two at least: multiples of 1, 2 or 5 times a power of ten.
+pub(super) fn ticks(range: [f64; 2], count: usize) -> Vec<f64> {
+    let found = round_values(range, count);
+    if found.len() > 1 { found } else { round_values(range, count + 2) }
+}
+
+fn round_values([low, high]: [f64; 2], count: usize) -> Vec<f64> {
     let rough = (high - low) / count.max(1) as f64;
     let power = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * power).find(|step| *step >= rough * 0.999);
@@ -64,6 +69,11 @@ mod tests {
         assert_eq!(ticks([-0.2, 1.05], 5), [0.0, 0.5, 1.0]);
         assert_eq!(tick_labels(&ticks([-0.2, 1.05], 5)), ["0.0", "0.5", "1.0"]);
         assert_eq!(tick_labels(&ticks([-3.0, 3.0], 4)), ["−2", "0", "2"]);
+        assert_eq!(
+            tick_labels(&ticks([-0.047, 0.047], 3)),
+            ["−0.04", "−0.02", "0.00", "0.02", "0.04"],
+            "not zero alone"
+        );
         assert_eq!(ticks([0.0, 60.0], 6), [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0]);
     }
 

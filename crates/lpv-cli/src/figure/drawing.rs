@@ -112,6 +112,10 @@ fn draw_panel(svg: &mut String, panel: &Panel, frame: &Frame, clip: &str) {
         draw_mark(svg, mark, frame);
     }
     svg.push_str("</g>\n");
+    for (point, label) in &panel.labels {
+        let [x, y] = frame.at(*point).map(round);
+        let _ = writeln!(svg, "<text text-anchor=\"middle\" x=\"{x}\" y=\"{}\">{}</text>", y + 4.0, markup(label));
+    }
     let _ = writeln!(
         svg,
         "<rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\"/>\n\

@@ -74,12 +74,14 @@ pub struct Panel {
     pub equal: bool,
     /// From back to front.
     pub marks: Vec<Mark>,
+    /// Words at points, in data coordinates, on top.
+    pub labels: Vec<([f64; 2], String)>,
 }
 
 impl Panel {
     /// A panel without marks.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
-        Self { title: title.into(), x, y, equal: false, marks: Vec::new() }
+        Self { title: title.into(), x, y, equal: false, marks: Vec::new(), labels: Vec::new() }
     }
 
     /// With a curve.

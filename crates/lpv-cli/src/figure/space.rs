@@ -42,7 +42,10 @@ pub fn path_in_space(title: &str, size: [f64; 3], square: f64, paths: &[PathInSp
         });
     }
     let across = format!("across, in the plane of the drawing / m; floor squares of {square} m");
+    // beyond the ends of the axes, where no path goes
+    let beyond = |axis: usize| project([0, 1, 2].map(|i| if i == axis { 1.08 * size[i] } else { 0.0 }));
     Panel {
+        labels: ["x", "y", "z"].iter().enumerate().map(|(axis, name)| (beyond(axis), (*name).to_owned())).collect(),
         title: title.into(),
         x: Axis::new(across),
         y: Axis::new("up, in the plane of the drawing / m"),

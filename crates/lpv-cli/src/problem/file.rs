@@ -27,12 +27,12 @@ pub struct ModelTable {
     /// Points over the range of the plant's parameter.
     pub grid_points: Option<usize>,
     /// Part of the range of the plant's parameter.
-    pub range: Option<[f64; 2]>,
+    pub range: Option<Vec<f64>>,
 }
 
 /// One matrix as rows, or a list of them.
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a matrix as a list of rows of numbers, or a list of such matrices")]
 pub enum Matrices {
     One(Vec<Vec<f64>>),
     Each(Vec<Vec<Vec<f64>>>),

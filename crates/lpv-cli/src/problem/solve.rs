@@ -2,12 +2,15 @@
 
 use super::{ProblemPlan, Scope};
 use crate::failure::Failure;
-use lmi::{Answer, Explanation, Outcome, Witness};
+use lmi::{Explanation, Outcome, Witness};
 use lpv::certificate::Verdict;
 use lpv::math::Mat;
 use lpv::math::matrix::{quadratic_form, to_rows};
 use lpv::model::{FrozenModel, Polytope};
-use lpv::synthesis::polytopic::{Lyapunov, PolytopicDesign, PolytopicRequest, Solution, frozen, synthesize};
+use lpv::synthesis::SynthesisError;
+use lpv::synthesis::polytopic::{
+    Lyapunov, PolytopicDesign, PolytopicRequest, Solution, Theorem, UnstabilizablePoint, frozen, synthesize,
+};
 use serde::Serialize;
 use serde::ser::SerializeMap;
 use std::time::Instant;
@@ -19,6 +22,8 @@ type Rows = Vec<Vec<f64>>;
 pub struct Report {
     /// solved, infeasible, unbounded or inaccurate; of several points the worst.
     pub status: &'static str,
+    /// The theorem of the thesis that was solved.
+    theorem: Theorem,
     /// The sign convention of K.
     convention: &'static str,
     /// tr Y or Σ tr Yᵢ; the cost bound where that is the objective; the reach along the directions; the margin of stability.
@@ -63,6 +68,9 @@ pub struct Report {
     inside_certified_set: Option<bool>,
     /// Proved lower bound on the smallest eigenvalue of each block.
     residuals: Margins,
+    /// Smallest eigenvalue, in floating point, of the inequality of each mixture of rows of K and F, of high-gain designs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mixtures: Option<Margins>,
     iterations: usize,
     seconds: f64,
     verdict: Verdict,
@@ -70,6 +78,9 @@ pub struct Report {
     verdict_reason: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     witness: Option<Vec<NamedMultiplier>>,
+    /// A point of the polytope that no input can stabilise, where that is the reason.
+    #[serde(rename = "unstabilizable_point", skip_serializing_if = "Option::is_none")]
+    unstabilizable: Option<UnstabilizablePoint>,
     #[serde(skip_serializing_if = "Option::is_none")]
     explanation: Option<Explanation>,
     /// The place that the status, witness and explanation are of, if it is one of several.
@@ -126,7 +137,7 @@ pub fn solve(plan: &ProblemPlan, path: &std::path::Path) -> Result<Report, Failu
         high_gain: plan.high_gain,
         objective: plan.objective.clone(),
     };
-    let failed = |source| Failure::Synthesis { controller: path.display().to_string(), source };
+    let failed = |error| failure_at(plan, path, error);
     let started = Instant::now();
     let designs = match &plan.scope {
         Scope::Polytope(_) => vec![synthesize(&Polytope::hull(&plan.models), &request).map_err(failed)?],
@@ -134,7 +145,30 @@ pub fn solve(plan: &ProblemPlan, path: &std::path::Path) -> Result<Report, Failu
     };
     let guaranteed = guaranteed_cost(plan, &designs, &request).map_err(failed)?;
     let seconds = started.elapsed().as_secs_f64();
-    Ok(report(plan, &designs, guaranteed, seconds))
+    let theorem = Theorem::of(
+        &Polytope::hull(&plan.models),
+        &request,
+        matches!(plan.scope, Scope::Frozen) && plan.models.len() > 1,
+    );
+    Ok(report(plan, theorem, &designs, guaranteed, seconds))
+}
+
+/// A failure of synthesis, which counts the places from zero, in the words of the file.
+fn failure_at(plan: &ProblemPlan, path: &std::path::Path, error: SynthesisError) -> Failure {
+    let place = |rho: f64| plan.places.get(rho as usize).map_or("the initial parameter", String::as_str);
+    let message = match &error {
+        SynthesisError::SampleTime { rho, sample_time_s } => format!(
+            "no gain from the low one to R⁻¹BᵀP is stable with the margin asked for when sampled every {sample_time_s:?} s, at {}; \
+             sample faster, or ask for less gain_margin",
+            place(*rho)
+        ),
+        SynthesisError::Riccati { rho, source } => format!("no regulator exists at {}: {source}", place(*rho)),
+        SynthesisError::Unbounded { rho } => {
+            format!("tr Y is unbounded at {}: some state costs nothing; give it a positive weight in Q", place(*rho))
+        }
+        _ => return Failure::Synthesis { controller: path.display().to_string(), source: error },
+    };
+    Failure::NoOptimum(format!("{}: {message}", path.display()))
 }
 
 /// x(0)ᵀP(ρ(0))x(0); of a frozen design P is of ρ(0) itself.
@@ -142,14 +176,19 @@ fn guaranteed_cost(
     plan: &ProblemPlan,
     designs: &[PolytopicDesign],
     request: &PolytopicRequest,
-) -> Result<Option<f64>, lpv::synthesis::SynthesisError> {
+) -> Result<Option<f64>, SynthesisError> {
     let Some(initial) = &plan.initial else { return Ok(None) };
     let p: Option<Mat<f64>> = match (&plan.scope, &initial.model) {
         (Scope::Frozen, Some(model)) => {
             let same = |other: &FrozenModel| other.a == model.a && other.b == model.b;
             match plan.models.iter().position(same) {
                 Some(at) => designs[at].solution.as_ref().map(|solution| solution.p[0].clone()),
-                None => frozen(std::slice::from_ref(model), request)?[0].solution.as_ref().map(|s| s.p[0].clone()),
+                None => {
+                    // not one of the model's points: no place of that number
+                    let here = frozen(std::slice::from_ref(model), request)
+                        .map_err(|error| error.moved_to(plan.models.len() as f64))?;
+                    here[0].solution.as_ref().map(|solution| solution.p[0].clone())
+                }
             }
         }
         _ => designs[0].solution.as_ref().and_then(|solution| match &initial.parameter {
@@ -160,12 +199,18 @@ fn guaranteed_cost(
     Ok(p.map(|p| quadratic_form(&p, &initial.state)))
 }
 
-fn report(plan: &ProblemPlan, designs: &[PolytopicDesign], guaranteed: Option<f64>, seconds: f64) -> Report {
+fn report(
+    plan: &ProblemPlan,
+    theorem: Theorem,
+    designs: &[PolytopicDesign],
+    guaranteed: Option<f64>,
+    seconds: f64,
+) -> Report {
     let severity = |design: &PolytopicDesign| match design.answer.outcome {
-        Outcome::Solved => 0,
-        Outcome::Inaccurate(_) => 1,
+        _ if design.is_infeasible() => 3,
         Outcome::Unbounded(_) => 2,
-        Outcome::Infeasible(_) => 3,
+        Outcome::Inaccurate(_) => 1,
+        _ => 0,
     };
     let worst = (0..designs.len()).rev().max_by_key(|&k| severity(&designs[k])).unwrap_or(0);
     let solutions: Option<Vec<&Solution>> = designs.iter().map(|design| design.solution.as_ref()).collect();
@@ -182,10 +227,11 @@ fn report(plan: &ProblemPlan, designs: &[PolytopicDesign], guaranteed: Option<f6
             .map(move |block| (format!("{}{}", place(k), block.name), block.verified_lower_bound))
     });
     let inside = guaranteed.zip(plan.saturation.as_ref()).map(|(bound, saturation)| bound <= saturation.gamma);
-    let (verdict, verdict_reason) = verdict(plan, &designs[worst].answer, inside);
+    let (verdict, verdict_reason) = verdict(plan, &designs[worst], inside);
     let (objective, objective_is) = objective(plan, designs);
     Report {
-        status: status(&designs[worst].answer.outcome),
+        status: status(&designs[worst]),
+        theorem,
         convention: "u = -K x",
         lyapunov: match &plan.scope {
             Scope::Frozen => "frozen",
@@ -216,18 +262,26 @@ fn report(plan: &ProblemPlan, designs: &[PolytopicDesign], guaranteed: Option<f6
         guaranteed_cost: guaranteed,
         inside_certified_set: inside,
         residuals: Margins(blocks.collect()),
+        mixtures: plan.high_gain.and(solutions.as_ref()).map(|all| {
+            let of = |(k, solution): (usize, &&Solution)| -> Vec<(String, f64)> {
+                solution.mixtures.iter().map(|(name, margin)| (format!("{}{name}", place(k)), *margin)).collect()
+            };
+            Margins(all.iter().enumerate().flat_map(of).collect())
+        }),
         iterations: designs.iter().map(|design| design.answer.iterations.len()).sum(),
         seconds,
         verdict,
         verdict_reason,
-        witness: witness(&designs[worst].answer),
+        witness: witness(&designs[worst]),
+        unstabilizable: designs[worst].unstabilizable.clone(),
         explanation: designs[worst].explanation.clone(),
         place: (designs.len() > 1 && severity(&designs[worst]) > 0).then(|| plan.places[worst].clone()),
     }
 }
 
-fn status(outcome: &Outcome) -> &'static str {
-    match outcome {
+fn status(design: &PolytopicDesign) -> &'static str {
+    match design.answer.outcome {
+        _ if design.is_infeasible() => "infeasible",
         Outcome::Solved => "solved",
         Outcome::Infeasible(_) => "infeasible",
         Outcome::Unbounded(_) => "unbounded",
@@ -252,8 +306,11 @@ fn objective(plan: &ProblemPlan, designs: &[PolytopicDesign]) -> (Option<f64>, &
 
 /// What a solved design is worth: its inequalities are verified for the Y and L that were found; what flies is K = LY⁻¹,
 /// rounded.
-fn verdict(plan: &ProblemPlan, answer: &Answer, inside: Option<bool>) -> (Verdict, String) {
-    match (&answer.outcome, &plan.scope, inside) {
+fn verdict(plan: &ProblemPlan, design: &PolytopicDesign, inside: Option<bool>) -> (Verdict, String) {
+    if let Some(point) = &design.unstabilizable {
+        return (Verdict::Refuted, unstabilizable(plan, point));
+    }
+    match (&design.answer.outcome, &plan.scope, inside) {
         (Outcome::Solved, _, Some(false)) => {
             (Verdict::Undecided, "the initial state is outside the certified set: x(0)'P x(0) > gamma, and nothing is claimed from there".into())
         }
@@ -278,7 +335,55 @@ fn verdict(plan: &ProblemPlan, answer: &Answer, inside: Option<bool>) -> (Verdic
     }
 }
 
-fn witness(answer: &Answer) -> Option<Vec<NamedMultiplier>> {
+/// Why a point of the polytope excludes every design, in words.
+fn unstabilizable(plan: &ProblemPlan, point: &UnstabilizablePoint) -> String {
+    let part = |(k, &w): (usize, &f64)| {
+        let name = plan.states.get(k).cloned().unwrap_or_else(|| format!("x{}", k + 1));
+        let v = point.direction_imaginary.get(k).copied().unwrap_or(0.0);
+        match (w.abs() > 1e-6, v.abs() > 1e-6) {
+            (false, false) => None,
+            (_, false) => Some(format!("{w:.6} {name}")),
+            (_, true) => Some(format!("({w:.6} {v:+.6}i) {name}")),
+        }
+    };
+    let mode: Vec<String> = point.direction.iter().enumerate().filter_map(part).collect();
+    let near: Vec<String> = (point.weights.iter().zip(&plan.places))
+        .filter(|&(&weight, _)| weight > 1e-3)
+        .map(|(weight, place)| format!("{weight:.4} × {place}"))
+        .collect();
+    let [re, im] = point.eigenvalue.map(|part| if part.abs() < 1e-9 { 0.0 } else { part });
+    let eigenvalue = if im == 0.0 { format!("{re:.3e}") } else { format!("{re:.3e} ± {:.3e}i", im.abs()) };
+    let which = format!("no input moves the mode {}, which does not decay (λ = {eigenvalue})", mode.join(" + "));
+    match plan.scope {
+        _ if point.weights.len() == 1 => format!("{which}: no gain stabilises it"),
+        _ if near.len() == 1 => {
+            format!("{which}, at {}: no gain stabilises it there", near[0].trim_start_matches("1.0000 × "))
+        }
+        _ => format!(
+            "{which}, at a point that the polytope holds, {}: no gain stabilises it there, and no finer division of the polytope helps",
+            near.join(" + ")
+        ),
+    }
+}
+
+/// The name that serde gives it.
+fn word(theorem: &Theorem) -> String {
+    serde_json::to_value(theorem).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+fn witness(design: &PolytopicDesign) -> Option<Vec<NamedMultiplier>> {
+    let answer = &design.answer;
+    if let Some(UnstabilizablePoint { weights, direction: w, direction_imaginary: v, .. }) = &design.unstabilizable {
+        let name =
+            |i: usize| if weights.len() == 1 { "stability".into() } else { format!("stability at vertex {}", i + 1) };
+        let imaginary = |i: usize| v.get(i).copied().unwrap_or(0.0);
+        let entry = |i: usize, j: usize| w[i] * w[j] + imaginary(i) * imaginary(j);
+        let multiplier = |share: f64| -> Rows {
+            (0..w.len()).map(|i| (0..w.len()).map(|j| share * entry(i, j)).collect()).collect()
+        };
+        let each = |(i, &share): (usize, &f64)| NamedMultiplier { name: name(i), multiplier: multiplier(share) };
+        return Some(weights.iter().enumerate().map(each).collect());
+    }
     let Outcome::Infeasible(Witness { multipliers, .. }) = &answer.outcome else { return None };
     let named = |(z, block): (&Mat<f64>, &lmi::BlockReport)| NamedMultiplier {
         name: block.name.clone(),
@@ -293,6 +398,7 @@ impl Report {
         let mut text = String::new();
         let mut line = |name: &str, value: String| text.push_str(&format!("{name:16} {value}\n"));
         line("status", self.status.into());
+        line("theorem", word(&self.theorem));
         if let Some(objective) = self.objective {
             line("objective", format!("{objective:.9e}  ({})", self.objective_is));
         }
@@ -306,7 +412,7 @@ impl Report {
             }
         }
         if let Some(s) = &self.s {
-            line("s", s.iter().map(|s| format!("{s:.6}")).collect::<Vec<_>>().join(", "));
+            line("s", s.iter().map(|s| format!("{s:.4e}")).collect::<Vec<_>>().join(", "));
         }
         if let Some(cost) = self.guaranteed_cost {
             line("cost bound", format!("{cost:.6}  ({})", self.verdict.word()));
@@ -318,7 +424,7 @@ impl Report {
         }
         line("verdict", format!("{}: {}", self.verdict.word(), self.verdict_reason));
         line("iterations", format!("{} in {:.4} s", self.iterations, self.seconds));
-        if let Some(explanation) = &self.explanation {
+        if let Some(explanation) = self.explanation.as_ref().filter(|_| self.unstabilizable.is_none()) {
             text.push_str(&format!("{explanation}\n"));
         }
         text
@@ -337,6 +443,12 @@ impl Report {
 
     /// What to relax, or which inequalities contradict each other.
     fn relaxation(&self) -> String {
+        if let Some(point) = &self.unstabilizable {
+            if point.weights.iter().filter(|&&weight| weight > 1e-3).count() == 1 {
+                return "; it needs an input there".into();
+            }
+            return "; leave that point out of the polytope: a smaller range, or vertices around the trajectories alone".into();
+        }
         let Some(explanation) = &self.explanation else { return String::new() };
         if let Some(carrier) = explanation.cheapest() {
             return format!("; relax \"{}\" first", carrier.name);

@@ -214,6 +214,7 @@ pub fn engineers_words(message: &str) -> String {
         ("expected usize", "expected a whole number, zero or more"),
         ("expected u64", "expected a whole number, zero or more"),
         ("expected f64", "expected a number"),
+        ("wanted string or table", "expected one of the words allowed, in quotes"),
         ("expected struct", "expected the table"),
         ("expected a sequence", "expected a list"),
         ("expected a map", "expected a table"),

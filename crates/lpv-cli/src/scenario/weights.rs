@@ -58,19 +58,19 @@ fn square(door: &Door, key: &str, rows: Rows, diag: Diagonal, size: usize) -> Re
         (None, Some(entries)) => {
             let key = format!("{key}_diag");
             if entries.len() != size {
-                return door.refuse(key, format!("has {} numbers: the plant needs {size}", entries.len()));
+                return door.refuse(key, format!("has {} numbers: the model needs {size}", entries.len()));
             }
             (key, diagonal(&entries))
         }
         (Some(rows), None) => {
             if rows.is_empty() {
-                let message = format!("has no rows: the plant needs a {size} × {size} matrix");
+                let message = format!("has no rows: the model needs a {size} × {size} matrix");
                 return door.refuse(key, message);
             }
             if rows.len() != size || rows.iter().any(|row| row.len() != size) {
                 let widths: Vec<String> = rows.iter().map(|row| row.len().to_string()).collect();
                 let message = format!(
-                    "has {} rows with {} numbers: the plant needs a {size} × {size} matrix",
+                    "has {} rows with {} numbers: the model needs a {size} × {size} matrix",
                     rows.len(),
                     widths.join(", ")
                 );

@@ -34,6 +34,14 @@ pub enum Standing {
     Integrated,
     /// The least cost of any controller.
     Floor,
+    /// Computed in floating point from the design or the model.
+    Computed,
+    /// Proved, for every parameter and with rounding accounted for.
+    Proved,
+    /// From elsewhere, not recomputed.
+    Quoted,
+    /// No solution exists: the number belongs to the witness.
+    Refuted,
 }
 
 impl Standing {
@@ -44,6 +52,10 @@ impl Standing {
             Standing::NoBound => "no bound",
             Standing::Integrated => "integrated",
             Standing::Floor => "floor",
+            Standing::Computed => "computed",
+            Standing::Proved => "proved",
+            Standing::Quoted => "quoted",
+            Standing::Refuted => "refuted",
         }
     }
 }

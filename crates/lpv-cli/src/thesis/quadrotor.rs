@@ -7,75 +7,122 @@ use lpv::estimator::NoiseCovariance;
 use lpv::math::matrix::diagonal;
 use lpv::model::BoxWeights;
 use lpv::plant::{Feature, Plant, PlantSpec, QuadrotorParameters};
-use lpv::sim::{Reference, SetPoint, Simulation, Trajectory};
+use lpv::sim::{Flight, Outcome, Performance, Reference, SetPoint, Simulation, Trajectory, performance};
 use lpv::synthesis::{CostWeights, Design, DesignRequest, HighGainOptions, Method, ScheduleKind, design};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-const SAMPLE_TIME_S: f64 = 0.002;
+pub const SAMPLE_TIME_S: f64 = 0.002;
 const STEP_AT_S: f64 = 1.0;
 const YAW: usize = 11;
 /// The set points of the figures, which the thesis gives as pictures only: x = y = z of this many metres with half a turn.
 /// Here the story is seen: the LPVQR fails with [0, mg/2], the SLPVQR does not; farther out γ = 1 fails.
 const NEAR_M: f64 = 6.0;
 const FAR_M: f64 = 18.0;
+/// What γ = 1 still flies along x alone.
+const ALONG_X_M: f64 = 35.0;
+/// Half a turn, short of where the two ways round are equally long.
+pub const HALF_TURN: f64 = PI * (1.0 - 1e-9);
 
-/// A controller with its limits.
-#[derive(Clone, Copy)]
-struct Pilot {
-    method: Method,
-    /// Largest force of a rotor in units of mg.
-    limit: Option<f64>,
-    /// Fly with noise and filter.
-    noise: bool,
-    set_point_m: f64,
-    duration_s: f64,
+/// The controllers of chapter VI, each designed once.
+pub struct Fleet {
+    pub plant: Box<dyn Plant>,
+    /// mg
+    pub weight_n: f64,
+    /// Theorem 4.5, limits none, [0, mg] and [0, mg/2].
+    pub lpvqr: [Design; 3],
+    /// Theorem 5.3 with [0, mg/2], γ = 1, 10, 20.
+    pub low: [Design; 3],
+    /// Theorem 5.4 with [0, mg/2], γ = 20.
+    pub high: Design,
 }
 
-fn weights() -> CostWeights {
+/// Q and R of (6.1), (6.2).
+pub fn weights() -> CostWeights {
     CostWeights { q: diagonal(&[1., 1., 100., 1., 1., 50., 50., 50., 50., 1., 1., 100.]), r: diagonal(&[0.001; 4]) }
 }
 
-fn fly(plant: &dyn Plant, spec: &PlantSpec, weight_n: f64, pilot: Pilot) -> Result<Trajectory, Failure> {
-    let limits = match pilot.limit {
-        None => InputLimits::none(4),
-        Some(limit) => InputLimits { min: vec![Some(0.0); 4], max: vec![Some(limit * weight_n); 4] },
-    };
-    let request = DesignRequest {
-        name: "quadrotor".into(),
-        method: pilot.method,
-        weights: weights(),
-        grid_points: 32,
-        schedule: ScheduleKind::Grid,
-        limits,
-        sample_time_s: SAMPLE_TIME_S,
-        rate_bounded: None,
-    };
-    let failed = |source| Failure::Synthesis { controller: "quadrotor".into(), source };
-    let Design { controller, .. } = design(spec, plant, &request, &|_| ()).map_err(failed)?;
-    let angle = 5.0_f64.to_radians().powi(2);
-    let covariance = NoiseCovariance {
-        process: diagonal(&[1e-4; 4]),
-        measurement: diagonal(&[0.01, 0.01, 0.01, angle, angle, angle]),
-    };
-    let targets =
-        vec![(3, pilot.set_point_m), (4, pilot.set_point_m), (5, pilot.set_point_m), (YAW, PI * (1.0 - 1e-9))];
-    let start = plant.trim(0.0).state;
-    let simulation = Simulation {
-        plant,
-        initial_state: start.clone(),
-        reference: Reference::new(start, vec![SetPoint { time_s: STEP_AT_S, targets }]),
-        duration_s: pilot.duration_s,
-        sample_time_s: SAMPLE_TIME_S,
-        steps_per_sample: 1,
-        state_weight: &request.weights.q,
-        input_weight: &request.weights.r,
-        noise: pilot.noise.then_some(&covariance),
-        estimate: pilot.noise,
-        seed: 1,
-        run: 0,
-    };
-    Ok(simulation.fly(&controller).trajectory)
+impl Fleet {
+    /// Design them.
+    pub fn new() -> Result<Self, Failure> {
+        let parameters = QuadrotorParameters::default();
+        let weight_n = parameters.mass_kg * parameters.gravity_m_s2;
+        let spec = PlantSpec::Quadrotor(parameters);
+        let plant = spec.build().map_err(|error| Failure::Defect(error.to_string()))?;
+        let made = |method: Method, limit: Option<f64>| {
+            let limits = match limit {
+                None => InputLimits::none(4),
+                Some(limit) => InputLimits { min: vec![Some(0.0); 4], max: vec![Some(limit * weight_n); 4] },
+            };
+            let request = DesignRequest {
+                name: "quadrotor".into(),
+                method,
+                weights: weights(),
+                grid_points: 32,
+                schedule: ScheduleKind::Grid,
+                limits,
+                sample_time_s: SAMPLE_TIME_S,
+                rate_bounded: None,
+            };
+            design(&spec, &*plant, &request, &|_| ())
+                .map_err(|source| Failure::Synthesis { controller: "quadrotor".into(), source })
+        };
+        let low = |gamma| made(Method::Slpvqr { gamma }, Some(0.5));
+        Ok(Self {
+            lpvqr: [made(Method::Lpvqr, None)?, made(Method::Lpvqr, Some(1.0))?, made(Method::Lpvqr, Some(0.5))?],
+            low: [low(1.0)?, low(10.0)?, low(20.0)?],
+            high: made(Method::HighGainSlpvqr { gamma: 20.0, high_gain: HighGainOptions::default() }, Some(0.5))?,
+            plant,
+            weight_n,
+        })
+    }
+
+    /// A flight to (x, y, z) and yaw from rest at the origin, the step at one second; with `noise` on the filter's estimate.
+    pub fn fly(&self, design: &Design, position_m: [f64; 3], yaw_rad: f64, noise: bool, duration_s: f64) -> Flight {
+        self.flight(design, position_m, yaw_rad, noise, duration_s).1
+    }
+
+    /// Settling time and cost of the same flight.
+    pub fn measure(&self, design: &Design, position_m: [f64; 3], yaw_rad: f64, duration_s: f64) -> Performance {
+        let (reference, flight) = self.flight(design, position_m, yaw_rad, false, duration_s);
+        performance(self.plant.description(), &reference, &flight)
+    }
+
+    fn flight(
+        &self,
+        design: &Design,
+        [x, y, z]: [f64; 3],
+        yaw_rad: f64,
+        noise: bool,
+        duration_s: f64,
+    ) -> (Reference, Flight) {
+        let angle = 5.0_f64.to_radians().powi(2);
+        let covariance = NoiseCovariance {
+            process: diagonal(&[1e-4; 4]),
+            measurement: diagonal(&[0.01, 0.01, 0.01, angle, angle, angle]),
+        };
+        let targets = [(3, x), (4, y), (5, z), (YAW, yaw_rad)].into_iter().filter(|&(_, value)| value != 0.0);
+        let start = self.plant.trim(0.0).state;
+        let set_point = SetPoint { time_s: STEP_AT_S, targets: targets.collect() };
+        let reference = Reference::new(start.clone(), vec![set_point]);
+        let CostWeights { q, r } = weights();
+        let simulation = Simulation {
+            plant: &*self.plant,
+            initial_state: start,
+            reference: reference.clone(),
+            duration_s,
+            sample_time_s: SAMPLE_TIME_S,
+            steps_per_sample: 1,
+            state_weight: &q,
+            input_weight: &r,
+            noise: noise.then_some(&covariance),
+            estimate: noise,
+            seed: 1,
+            run: 0,
+        };
+        let flight = simulation.fly(&design.controller);
+        (reference, flight)
+    }
 }
 
 /// Time and a value of every tenth sample.
@@ -96,6 +143,15 @@ fn unwrapped(flight: &Trajectory, state: usize) -> Vec<[f64; 2]> {
             [t, value.to_degrees()]
         })
         .collect()
+}
+
+/// Which of the flights were flown to the end, in words.
+fn told(flights: &[(&str, &Flight)]) -> String {
+    let end = |(label, flight): &(&str, &Flight)| match flight.outcome {
+        Outcome::Completed => format!("{label} flies"),
+        _ => format!("{label} is lost after {:.1} s", flight.trajectory.time_s.last().copied().unwrap_or(0.0)),
+    };
+    flights.iter().map(end).collect::<Vec<_>>().join(", ")
 }
 
 type Labelled<'a> = (&'a str, &'a Trajectory, Style);
@@ -169,37 +225,38 @@ fn forces(
 }
 
 /// The figures of chapters III and VI.
-pub fn figures() -> Result<Vec<Figure>, Failure> {
-    let parameters = QuadrotorParameters::default();
-    let weight_n = parameters.mass_kg * parameters.gravity_m_s2;
-    let spec = PlantSpec::Quadrotor(parameters);
-    let plant = spec.build().map_err(|error| Failure::Defect(error.to_string()))?;
-    let high = |gamma| Method::HighGainSlpvqr { gamma, high_gain: HighGainOptions::default() };
-    let low = |gamma| Method::Slpvqr { gamma };
-    let pilot = |method, limit| Pilot { method, limit, noise: false, set_point_m: NEAR_M, duration_s: 40.0 };
-    let far = |method| Pilot { set_point_m: FAR_M, ..pilot(method, Some(0.5)) };
-    let pilots = [
-        pilot(Method::Lpvqr, None),
-        pilot(Method::Lpvqr, Some(1.0)),
-        pilot(Method::Lpvqr, Some(0.5)),
-        pilot(low(1.0), Some(0.5)),
-        pilot(low(10.0), Some(0.5)),
-        pilot(low(20.0), Some(0.5)),
-        pilot(high(20.0), Some(0.5)),
-        far(low(1.0)),
-        far(low(10.0)),
-        far(low(20.0)),
-        Pilot { noise: true, ..pilot(high(20.0), Some(0.5)) },
-    ];
-    let flights: Vec<_> = pilots.par_iter().map(|pilot| fly(&*plant, &spec, weight_n, *pilot)).collect();
-    let flights: Vec<Trajectory> = flights.into_iter().collect::<Result<_, _>>()?;
-    let [free, two, one, low_1, low_10, low_20, high_20, far_1, far_10, far_20, noisy] = &flights[..] else {
+pub fn figures(fleet: &Fleet) -> Result<Vec<Figure>, Failure> {
+    let Fleet { plant, weight_n, lpvqr: [free, two, one], low: [low_1, low_10, low_20], high } = fleet;
+    let (near, far) = ([NEAR_M; 3], [FAR_M; 3]);
+    // half a turn is as far either way round, and noise decides: the last two are asked to take the way that it takes here
+    let flights: Vec<Flight> = [
+        (free, near, HALF_TURN, false),
+        (two, near, HALF_TURN, false),
+        (one, near, HALF_TURN, false),
+        (low_1, near, HALF_TURN, false),
+        (low_10, near, HALF_TURN, false),
+        (low_20, near, HALF_TURN, false),
+        (high, near, HALF_TURN, false),
+        (low_1, far, HALF_TURN, false),
+        (low_10, far, HALF_TURN, false),
+        (low_20, far, HALF_TURN, false),
+        (low_1, [ALONG_X_M, NEAR_M, NEAR_M], HALF_TURN, false),
+        (high, near, -HALF_TURN, true),
+        (high, near, -HALF_TURN, false),
+    ]
+    .par_iter()
+    .map(|&(design, to, yaw, noise)| fleet.fly(design, to, yaw, noise, 40.0))
+    .collect();
+    let trajectories: Vec<&Trajectory> = flights.iter().map(|flight| &flight.trajectory).collect();
+    let [free, two, one, low_1, low_10, low_20, high_20, far_1, far_10, far_20, _, noisy, quiet] = trajectories[..]
+    else {
         return Err(Failure::Defect("a flight is missing".into()));
     };
+    let consistency = flights[11].consistency.as_ref().ok_or_else(|| Failure::Defect("no filter flew".into()))?;
     let (solid, dashed) = (Style::solid, |color: u8| Style::with(color, Dash::Dashed));
     let dotted = |color: u8| Style::with(color, Dash::Chain);
     let set_point = format!("Set point x = y = z = {NEAR_M} m with ψ = 180° at t = {STEP_AT_S} s.");
-    let top = 0.5 * weight_n;
+    let top = 0.5 * *weight_n;
     let three = |a, b, c| [("γ = 1", a, solid(0)), ("γ = 10", b, dashed(1)), ("γ = 20", c, dotted(2))];
 
     let box_weights = BoxWeights::new(&[Feature::Sin, Feature::Cos]);
@@ -263,7 +320,10 @@ pub fn figures() -> Result<Vec<Figure>, Failure> {
     figures.push(states(
         "6.7",
         "Responses under the LPVQR with bounded inputs",
-        format!("{set_point} With [0, mg] for each rotor (\"2 g\") it still flies; with [0, mg/2] (\"1 g\") the vehicle is lost."),
+        format!(
+            "{set_point} {} ([0, mg] for each rotor is the thesis's \"2 g\", [0, mg/2] its \"1 g\").",
+            told(&[("Unbounded", &flights[0]), ("[0, mg]", &flights[1]), ("[0, mg/2]", &flights[2])])
+        ),
         20.0,
         &[("unbounded", free, solid(0)), ("[0, mg]", two, dashed(1)), ("[0, mg/2]", one, dotted(4))],
     ));
@@ -291,7 +351,7 @@ pub fn figures() -> Result<Vec<Figure>, Failure> {
     figures.push(Figure {
         number: "6.10",
         title: "Paths of the SLPVQR in space".into(),
-        caption: "From the origin to (6, 6, 6) m; a dot for each second.".into(),
+        caption: format!("From the origin to ({NEAR_M}, {NEAR_M}, {NEAR_M}) m; a dot for each second. Seen from a corner, without perspective."),
         columns: 1,
         aspect: 0.7,
         panels: vec![path_in_space(
@@ -306,8 +366,10 @@ pub fn figures() -> Result<Vec<Figure>, Failure> {
         "6.11",
         "Responses under the SLPVQR, farther away",
         format!(
-            "Set point x = y = z = {FAR_M} m with ψ = 180°. γ = 1 fails, γ = 10 and 20 fly it: the certified sets, of a metre or \
-             two, say nothing of either."
+            "Set point x = y = z = {FAR_M} m with ψ = 180°. {}: the certified sets, of a metre or two, say nothing of either. The thesis \
+             moves the set point along x alone; there γ = 1 {} x = {ALONG_X_M} m with y = z = {NEAR_M} m.",
+            told(&[("γ = 1", &flights[7]), ("γ = 10", &flights[8]), ("γ = 20", &flights[9])]),
+            if flights[10].outcome == Outcome::Completed { "still flies" } else { "does not fly" },
         ),
         40.0,
         &three(far_1, far_10, far_20),
@@ -342,7 +404,7 @@ pub fn figures() -> Result<Vec<Figure>, Failure> {
     figures.push(Figure {
         number: "6.14",
         title: "Responses and measurements with noise and filter".into(),
-        caption: format!("{set_point} High gain, γ = 20, on the estimate of the extended Kalman filter. Yaw is measured in [−180°, 180°)."),
+        caption: format!("{set_point} High gain, γ = 20, on the estimate of the extended Kalman filter. Half a turn is as far either way round; here it goes to −180°."),
         columns: 2,
         aspect: 0.42,
         panels: [0, 3, 1, 4, 2, 5].map(measured).into(),
@@ -351,9 +413,10 @@ pub fn figures() -> Result<Vec<Figure>, Failure> {
     figures.push(forces(
         "6.15",
         "Inputs with and without noise",
-        "The estimate's noise goes through the high gain: the rotors move between their limits.".into(),
+        "Both turn to −180°. The estimate's noise goes through the high gain: the rotors move between their limits."
+            .into(),
         6.0,
-        &[("with noise and filter", noisy, Style::with(5, Dash::Solid)), ("without", high_20, solid(0))],
+        &[("with noise and filter", noisy, Style::with(5, Dash::Solid)), ("without", quiet, solid(0))],
         Some(top),
     ));
     let names = plant.description().states.iter().map(|signal| (signal.name.clone(), signal.unit.clone()));
@@ -368,7 +431,14 @@ pub fn figures() -> Result<Vec<Figure>, Failure> {
         };
         let bound = at(&|k| 3.0 * noisy.deviations[k][i]);
         let below = bound.iter().map(|[t, value]| [*t, -value]).collect::<Vec<_>>();
-        Panel::new("", Axis::over("t / s", 0.0, 40.0), Axis::new(format!("{name} / ({unit})")))
+        let name = match name.as_str() {
+            "phi" => "φ",
+            "theta" => "θ",
+            "psi" => "ψ",
+            other => other,
+        };
+        let unit = if unit.contains('/') { format!("({unit})") } else { unit };
+        Panel::new("", Axis::over("t / s", 0.0, 40.0), Axis::new(format!("{name} / {unit}")))
             .line(at(&error), solid(0))
             .line(bound, dashed(1))
             .line(below, dashed(1))
@@ -376,7 +446,13 @@ pub fn figures() -> Result<Vec<Figure>, Failure> {
     figures.push(Figure {
         number: "6.16",
         title: "Estimation errors and ±3σ".into(),
-        caption: "Error of each state, x − x̂, with the filter's own ±3σ: inside for 99.6 to 99.9 % of the time.".into(),
+        caption: format!(
+            "Error of each state, x − x̂, with the filter's own ±3σ: inside for {:.1} to {:.1} % of the time; mean of eᵀP⁻¹e {:.2}, of a \
+             consistent filter 12.",
+            100.0 * consistency.inside_three_sigma.iter().copied().fold(1.0, f64::min),
+            100.0 * consistency.inside_three_sigma.iter().copied().fold(0.0, f64::max),
+            consistency.nees
+        ),
         columns: 3,
         aspect: 0.6,
         panels: errors.collect(),

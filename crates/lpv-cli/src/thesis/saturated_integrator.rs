@@ -18,8 +18,10 @@ use lpv::synthesis::polytopic::{InputBounds, Lyapunov, Objective, PolytopicReque
 const R: f64 = 0.001;
 /// x(0) of Table 5.1 and of the trajectories.
 const START: [f64; 2] = [0.0, 2.0];
-/// The point of the segment K_s between the low gain and R⁻¹BᵀP on which the printed high gain (5.14) lies.
-const S: f64 = 0.102;
+/// The gains printed in (5.6), (5.9) and (5.14).
+const PRINTED_LQR: [f64; 2] = [31.6241, 32.6078];
+const PRINTED_SLQR: [f64; 2] = [0.4378, 1.1094];
+const PRINTED_HIGH: [f64; 2] = [117.0280, 152.2037];
 /// Levels of the certified sets.
 const GAMMAS: [f64; 3] = [1.0, 30.0, 60.0];
 
@@ -33,7 +35,8 @@ struct Regulated {
 pub fn chapter() -> Result<(Table, Vec<Figure>), Failure> {
     let lqr = regulator()?;
     let low: Vec<Regulated> = GAMMAS.into_iter().map(|gamma| slqr(1.0, gamma)).collect::<Result<_, _>>()?;
-    let high: Vec<Regulated> = GAMMAS.into_iter().map(high_gain).collect::<Result<_, _>>()?;
+    let (s, from_segment) = printed_point(&low[0]);
+    let high: Vec<Regulated> = low.iter().map(|low| high_gain(low, s)).collect();
 
     let lqr_flight = fly(&lqr.k, 1.0, START, 60.0)?;
     let low_flights: Vec<_> = low.iter().map(|design| fly(&design.k, 1.0, START, 150.0)).collect::<Result<_, _>>()?;
@@ -83,10 +86,45 @@ pub fn chapter() -> Result<(Table, Vec<Figure>), Failure> {
             (bound, 4, standing),
             why,
             &high_flights[k],
-            "Theorem 5.2 leaves the gain open; taken is K_s at s = 0.102, where the printed gain (5.14) lies. The cost hardly \
-             depends on s; the printed one is 0.002 to 0.006 low besides.",
+            &format!(
+                "Theorem 5.2 leaves the gain open; taken is K_s at s = {s:.4}, where the printed gain (5.14) lies. The cost hardly \
+                 depends on s; the printed one is 0.002 to 0.006 low besides."
+            ),
         );
     }
+    let mut gain = |row: &str, printed: [f64; 2], k: &Mat<f64>, reason: &str| {
+        for (j, quantity) in ["K, entry 1", "K, entry 2"].into_iter().enumerate() {
+            entries.push(Entry {
+                row: row.into(),
+                quantity,
+                printed: Some(printed[j]),
+                value: Some(k[(0, j)]),
+                decimals: 6,
+                standing: Standing::Computed,
+                reason: reason.into(),
+            });
+        }
+    };
+    gain(
+        "LQR gain (5.6)",
+        PRINTED_LQR,
+        &lqr.k,
+        "By the Riccati equation; the thesis prints what its LMI solver left of accuracy.",
+    );
+    gain("SLQR gain (5.9), γ = 1", PRINTED_SLQR, &low[0].k, "");
+    let reason = format!(
+        "Not unique: the printed gain is this point of the segment of solutions F + s(R⁻¹BᵀP − F), {from_segment:.0e} off it relatively."
+    );
+    gain("High gain (5.14), γ = 1", PRINTED_HIGH, &high[0].k, &reason);
+    entries.push(Entry {
+        row: "High gain (5.14), γ = 1".into(),
+        quantity: "s on K_s",
+        printed: None,
+        value: Some(s),
+        decimals: 4,
+        standing: Standing::Computed,
+        reason,
+    });
     let table = Table {
         number: "5.1",
         title: "LQR, SLQR and high-gain SLQR of the saturated double integrator".into(),
@@ -154,12 +192,24 @@ fn slqr(sigma: f64, gamma: f64) -> Result<Regulated, Failure> {
     }
 }
 
+/// R⁻¹BᵀP, B = [0; 1]
+fn highest(p: &Mat<f64>) -> [f64; 2] {
+    [p[(1, 0)] / R, p[(1, 1)] / R]
+}
+
 /// Theorem 5.2, which has the P of Theorem 5.1, with the gain K_s = F + s(R⁻¹BᵀP − F).
-fn high_gain(gamma: f64) -> Result<Regulated, Failure> {
-    let Regulated { k: f, p } = slqr(1.0, gamma)?;
-    // R⁻¹BᵀP, B = [0; 1]
-    let k = Mat::from_fn(1, 2, |_, j| (1.0 - S) * f[(0, j)] + S * p[(1, j)] / R);
-    Ok(Regulated { k, p })
+fn high_gain(Regulated { k: f, p }: &Regulated, s: f64) -> Regulated {
+    let end = highest(p);
+    Regulated { k: Mat::from_fn(1, 2, |_, j| (1.0 - s) * f[(0, j)] + s * end[j]), p: p.clone() }
+}
+
+/// The s at which K_s is closest to the printed high gain (5.14), and the relative distance left.
+fn printed_point(low: &Regulated) -> (f64, f64) {
+    let end = highest(&low.p);
+    let (along, from) = ([0, 1].map(|j| end[j] - low.k[(0, j)]), [0, 1].map(|j| PRINTED_HIGH[j] - low.k[(0, j)]));
+    let s = (along[0] * from[0] + along[1] * from[1]) / (along[0].powi(2) + along[1].powi(2));
+    let left = (from[0] - s * along[0]).hypot(from[1] - s * along[1]);
+    (s, left / PRINTED_HIGH[0].hypot(PRINTED_HIGH[1]))
 }
 
 /// u = −sat(Kx), |u| ≤ `sigma`.
@@ -200,11 +250,17 @@ fn figures(
         columns: 1,
         aspect: 0.5,
         panels: vec![
-            Panel::new("", Axis::over("x_1 / m", -0.6, 2.4), Axis::over("x_2 / (m/s)", -1.2, 2.2))
+            Panel::new("", Axis::over("x_1 / m", -0.6, 2.4), Axis::over("x_2 / (m/s)", -1.6, 2.3))
+                .line(strip(&lqr.k, 1.0, REACH), fill(2))
+                .line(strip(&lqr.k, 1.0, REACH), Style::with(2, Dash::Dotted))
                 .line(path(&unbounded), Style::solid(0))
                 .line(path(lqr_flight), dashed(1)),
         ],
-        legend: vec![("unbounded input".into(), Style::solid(0)), ("|u| ≤ 1".into(), dashed(1))],
+        legend: vec![
+            ("unbounded input".into(), Style::solid(0)),
+            ("|u| ≤ 1".into(), dashed(1)),
+            ("unsaturated, |Kx| ≤ 1".into(), fill(2)),
+        ],
     });
 
     figures.push(Figure {
@@ -261,12 +317,13 @@ fn figures(
         title: "Trajectories and ellipsoids of the LQR and the SLQR".into(),
         caption: "Each trajectory starts on the boundary xᵀPx = 1 of its own ellipsoid, |u| ≤ 1. The one of the LQR leaves its \
                   ellipsoid by far (it passes x₁ = 15 m); the one of the SLQR (σ = 1, γ = 1) stays inside, and its ellipsoid \
-                  lies within the strip |Kx| ≤ 1."
+                  lies within the strip |Kx| ≤ 1. The strip of the LQR is too narrow to be told from a line."
             .into(),
         columns: 2,
         aspect: 0.8,
         panels: vec![
-            Panel::new("LQR", Axis::over("x_1 / m", -4.0, 18.0), Axis::over("x_2 / (m/s)", -7.0, 7.0))
+            Panel::new("LQR", Axis::over("x_1 / m", -9.0, 18.0), Axis::over("x_2 / (m/s)", -7.0, 7.0))
+                .line(strip(&lqr.k, 1.0, REACH), Style::with(2, Dash::Dotted))
                 .line(ellipse(&lqr.p, 1.0), Style::solid(1))
                 .line(path(&leaving), dashed(1)),
             plane("SLQR, γ = 1", [2.6, 1.6])
@@ -280,6 +337,7 @@ fn figures(
             ("ellipsoid, SLQR".into(), Style::solid(0)),
             ("trajectory, SLQR".into(), dashed(0)),
             ("unsaturated, SLQR".into(), fill(0)),
+            ("unsaturated, LQR".into(), Style::with(2, Dash::Dotted)),
         ],
     });
 

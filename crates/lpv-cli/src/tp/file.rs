@@ -23,7 +23,7 @@ pub struct ModelFile {
 pub struct ParameterTable {
     pub name: String,
     pub unit: Option<String>,
-    pub range: Option<[f64; 2]>,
+    pub range: Option<Vec<f64>>,
     pub grid_points: Option<usize>,
     /// Grid points in full, instead of range and number.
     pub values: Option<Vec<f64>>,

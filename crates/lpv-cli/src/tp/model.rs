@@ -263,8 +263,13 @@ fn grid(
         }
         return Ok(ParameterGrid { name: table.name.clone(), unit: unit.into(), points: values.clone() });
     }
-    let Some([low, high]) = table.range.or(range) else {
-        return door.refuse(key, "has neither values nor a range");
+    let (low, high) = match (table.range.as_deref(), range) {
+        (Some(&[low, high]), _) | (None, Some([low, high])) => (low, high),
+        (Some(other), _) => {
+            let message = format!("has {} numbers: it has two, the least and the largest", other.len());
+            return door.refuse(format!("{key}.range"), message);
+        }
+        (None, None) => return door.refuse(key, "has neither values nor a range"),
     };
     if !(low.is_finite() && high.is_finite() && (high - low).is_finite() && low < high) {
         return door.refuse(format!("{key}.range"), format!("is [{low}, {high}]: it has to rise, and be finite"));

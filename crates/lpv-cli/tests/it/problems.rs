@@ -49,18 +49,104 @@ fn initial_state_outside_the_set() {
     assert_eq!((&answer["inside_certified_set"], &answer["verdict"]), (&false.into(), &"undecided".into()));
 }
 
-/// An infeasible problem ends with code 3, its witness and what to relax; the answer is printed all the same.
+/// An infeasible problem ends with code 3, its witness and the reason; the answer is printed all the same. The hull of the yaw circle
+/// holds its centre, where roll and pitch have no input.
 #[test]
 fn infeasible() {
-    let text =
-        "[model]\nplant = \"quadrotor\"\ngrid_points = 4\n[design]\nmethod = \"stabilize\"\nlyapunov = \"common\"\n";
-    let place = Place::with(text);
-    let ended = place.lpv("design scenario.toml --json");
-    ended.refuses(3, &["infeasible", "relax several", "stability at vertex 1"]);
-    let answer: Value = serde_json::from_str(&ended.out).unwrap();
-    assert_eq!(answer["status"], "infeasible");
-    assert!(answer["K"].is_null() && answer["explanation"]["distance"].as_f64().unwrap() > 0.0);
-    assert!(!answer["witness"].as_array().unwrap().is_empty());
+    for grid_points in [4, 5, 8] {
+        let text = format!(
+            "[model]\nplant = \"quadrotor\"\ngrid_points = {grid_points}\n[design]\nmethod = \"stabilize\"\nlyapunov = \"common\"\n"
+        );
+        let place = Place::with(&text);
+        let ended = place.lpv("design scenario.toml --json");
+        ended.refuses(3, &["infeasible", "no input moves the mode", "that the polytope holds"]);
+        let answer: Value = serde_json::from_str(&ended.out).unwrap();
+        assert_eq!((&answer["status"], &answer["verdict"]), (&"infeasible".into(), &"refuted".into()));
+        assert!(answer["K"].is_null() && !answer["explanation"]["carriers"].as_array().unwrap().is_empty());
+        assert!(!answer["witness"].as_array().unwrap().is_empty());
+        let direction: Vec<f64> = serde_json::from_value(answer["unstabilizable_point"]["direction"].clone()).unwrap();
+        assert!((direction[9].hypot(direction[10]) - 1.0).abs() < 1e-9, "{direction:?}");
+    }
+}
+
+/// A pair (A, B) that no input stabilises is an outcome, for every Lyapunov function.
+#[test]
+fn a_model_without_stabilising_input() {
+    for lyapunov in ["common", "frozen"] {
+        let text = edited(DOUBLE_INTEGRATOR, "A = [[0, 1], [0, 0]]", "A = [[1, 0], [0, -1]]");
+        let text = edited(&text, "method = \"slqr\"", &format!("method = \"slqr\"\nlyapunov = \"{lyapunov}\""));
+        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "1.000000 x1", "needs an input"]);
+        let text = edited(&text, "A = [[1, 0], [0, -1]]\nB = [[0], [1]]", "A = [[0, 2], [-2, 0]]\nB = [[0], [0]]");
+        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "± 2.000e0i"]);
+    }
+}
+
+/// A sampler so slow that no gain is stable, and one that leaves the low gain alone.
+#[test]
+fn slow_sampling() {
+    let sampled = |time: &str| {
+        edited(DOUBLE_INTEGRATOR, "high_gain = true", &format!("high_gain = true\nsample_time_s = {time}"))
+    };
+    for time in ["100", "1e308"] {
+        Place::with(sampled(time))
+            .lpv("design scenario.toml")
+            .refuses(3, &["no gain", "sample faster", "operating point"]);
+    }
+    let [fast, slow] = ["0.001", "2"].map(|time| answer(&sampled(time))["s"][0].as_f64().unwrap());
+    assert!(fast > 1e-3 && slow < 1e-4, "{fast}, {slow}");
+}
+
+/// The answer names its theorem.
+#[test]
+fn theorems() {
+    let common = edited(PENDULUM, "lyapunov = \"parameter-dependent\"", "lyapunov = \"common\"");
+    let common = edited(&common, "rate_bound = 0.87236364", "#");
+    let varying = edited(&common, "B = [[[0], [1]]]", "B = [[[0], [1]], [[0], [2]]]");
+    for (text, theorem) in [
+        (PENDULUM, "Theorem 4.4"),
+        (&common, "Corollary 4.1"),
+        (&varying, "Theorem 4.3"),
+        (&edited(&common, "\"common\"", "\"frozen\""), "Theorem 4.5"),
+        (DOUBLE_INTEGRATOR, "Theorem 5.2"),
+    ] {
+        assert_eq!(answer(text)["theorem"], theorem);
+    }
+}
+
+/// The gain that is returned meets the inequality of every mixture, at both vertices, with a general R too.
+#[test]
+fn mixtures_of_a_high_gain() {
+    let text = "[model]\nA = [[[0, 1, 0], [0, 0, 1], [-0.5, 0, 0]], [[0, 1, 0], [0, 0, 1], [0.3, 0, 0]]]\nB = [[[0, 0.3], [1, 0], [0, 1]]]\n\
+        [weights]\nQ_diag = [1, 2, 3]\nR = [[0.1, 0.05], [0.05, 0.2]]\n\
+        [design]\nmethod = \"slpvqr\"\nsigma = [1, 0.5]\ngamma = 1\nhigh_gain = true\n";
+    let answer = answer(text);
+    let mixtures = answer["mixtures"].as_object().unwrap();
+    assert_eq!(mixtures.len(), 8);
+    assert!(mixtures.values().all(|margin| margin.as_f64().unwrap() > 0.0), "{mixtures:?}");
+}
+
+/// A plant between its linearisations as vertices, at a bounded rate of their weights.
+#[test]
+fn plant_at_a_bounded_rate() {
+    let text = "[model]\nplant = \"quadrotor\"\ngrid_points = 2\nrange = [0.5, 1.5]\n\
+        [weights]\nQ_diag = [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\nR_diag = [1, 1, 1, 1]\n\
+        [design]\nmethod = \"lpvqr\"\nlyapunov = \"parameter-dependent\"\nrate_bound = 0.5\n\
+        initial_state = [0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0]\ninitial_parameter = [0.75]\n";
+    let slow = answer(text);
+    let fast = answer(&edited(text, "rate_bound = 0.5", "rate_bound = 5"));
+    assert_eq!(slow["theorem"], "Theorem 4.4");
+    assert!(slow["objective"].as_f64().unwrap() > fast["objective"].as_f64().unwrap());
+    let outside = edited(text, "initial_parameter = [0.75]", "initial_parameter = [0.25]");
+    Place::with(&outside).lpv("design scenario.toml").refuses(2, &["design.initial_parameter", "0.5", "1.5"]);
+}
+
+/// Of frozen designs each point has the least bound of the initial state that it can have.
+#[test]
+fn frozen_designs_for_an_initial_state() {
+    let frozen =
+        edited(PENDULUM, "lyapunov = \"parameter-dependent\"", "lyapunov = \"frozen\"\nobjective = \"initial-state\"");
+    let answer = answer(&edited(&frozen, "rate_bound = 0.87236364", "# rate_bound"));
+    close(&answer["guaranteed_cost"], 55.865797, 1e-5);
 }
 
 /// A quadrotor that yaws within 30° can be stabilised by one Lyapunov function.
@@ -132,7 +218,9 @@ fn bad_input() {
         ("initial_parameter = [0, 1]", "", ["design.initial_parameter", "is missing"]),
         ("initial_parameter = [0, 1]", "initial_parameter = [1, 1]", ["design.initial_parameter", "sum to one"]),
         ("initial_parameter = [0, 1]", "initial_parameter = [0, 1]\nsample = 1", ["unknown key `sample`", "line"]),
-        ("[model]", "[model]\nplant = \"quadrotor\"", ["design.lyapunov", "rate_bound"]),
+        ("[model]", "[model]\nplant = \"quadrotor\"", ["model", "keep one"]),
+        ("A = [[[0, 1], [1, -0.1]], [[0, 1], [0, -0.1]]]", "A = 3", ["expected a matrix", "list of such matrices"]),
+        ("method = \"lpvqr\"", "method = 3", ["method = 3", "one of the words"]),
     ] {
         let place = Place::with(edited(PENDULUM, from, to));
         let ended = place.lpv("design scenario.toml --json");

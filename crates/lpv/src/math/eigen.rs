@@ -20,11 +20,21 @@ pub fn smallest_eigenvector(matrix: &Mat<f64>) -> Option<Vec<f64>> {
     Some((0..matrix.nrows()).map(|i| eigen.U()[(i, 0)]).collect())
 }
 
-/// Orthonormal eigenvectors of a symmetric matrix as columns, to rounding, by ascending eigenvalue; `None` for a matrix with
-/// a non-finite entry.
-pub fn symmetric_eigenvectors(matrix: &Mat<f64>) -> Option<Mat<f64>> {
+/// Eigenvalues in ascending order and eigenvectors, as columns, of a symmetric matrix; `None` for one with a non-finite entry.
+pub fn symmetric_eigenvectors(matrix: &Mat<f64>) -> Option<(Vec<f64>, Mat<f64>)> {
     let eigen = matrix.self_adjoint_eigen(Side::Lower).ok()?;
-    Some(Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| eigen.U()[(i, j)]))
+    let n = matrix.nrows();
+    Some(((0..n).map(|i| eigen.S()[i]).collect(), eigen.U().to_owned()))
+}
+
+/// A unit vector w with ‖wᵀM‖ = σ_min(M) of a matrix with no more rows than columns, its largest entry positive; `None` for
+/// a matrix with a non-finite entry.
+pub fn smallest_singular_vector(matrix: &Mat<f64>) -> Option<Vec<f64>> {
+    let svd = matrix.svd().ok()?;
+    let (rows, last) = (matrix.nrows(), matrix.nrows() - 1);
+    let w: Vec<f64> = (0..rows).map(|i| svd.U()[(i, last)]).collect();
+    let largest = w.iter().copied().fold(0.0, |most: f64, entry| if entry.abs() > most.abs() { entry } else { most });
+    Some(w.iter().map(|entry| entry * largest.signum()).collect())
 }
 
 /// The eigenvalues (re, im) of a real square matrix, in no particular order.

@@ -17,10 +17,13 @@ pub fn discretize(a: &Mat<f64>, b: &Mat<f64>, sample_time_s: f64) -> (Mat<f64>, 
     (e.submatrix(0, 0, n, n).to_owned(), e.submatrix(0, n, n, m).to_owned())
 }
 
-/// e^M by scaling and squaring with the diagonal [6/6] Padé approximant (Higham 2005).
+/// e^M by scaling and squaring with the diagonal [6/6] Padé approximant (Higham 2005); NaN where M is beyond the range of numbers.
 fn exponential(m: &Mat<f64>) -> Mat<f64> {
     const DEGREE: usize = 6;
     let n = m.nrows();
+    if !m.norm_l2().is_finite() {
+        return Mat::from_fn(n, n, |_, _| f64::NAN);
+    }
     let squarings = (m.norm_l2() / 0.5).log2().ceil().max(0.0) as i32;
     let x = Mat::from_fn(n, n, |i, j| m[(i, j)] * 0.5f64.powi(squarings));
     let (mut numerator, mut denominator, mut power) = (identity(n), identity(n), identity(n));
@@ -55,6 +58,13 @@ mod tests {
         let (ad, bd) = discretize(&a, &b, 0.5);
         assert!((ad - from_rows(&[vec![1.0, 0.5], vec![0.0, 1.0]])).norm_max() < 1e-15);
         assert!((bd - from_rows(&[vec![0.125], vec![0.5]])).norm_max() < 1e-15);
+    }
+
+    /// Squaring would take 2³¹ products.
+    #[test]
+    fn exponent_beyond_the_range_of_numbers() {
+        let (ad, _) = discretize(&from_rows(&[vec![1e200]]), &from_rows(&[vec![1.0]]), 1e200);
+        assert!(ad[(0, 0)].is_nan());
     }
 
     #[test]

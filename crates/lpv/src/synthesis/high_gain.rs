@@ -174,13 +174,25 @@ impl Segment {
             Some(trace(&(x * &y0)) / y0.nrows() as f64)
         };
         // ten to a decade: the choice is flat, and a grid makes it the same at points that differ by rounding only
-        let candidates: Vec<(f64, f64)> = (-40..=0)
-            .map(|k| 10f64.powf(f64::from(k) / 10.0))
-            .filter_map(|s| {
-                let k = self.gain(s);
-                (sampled_is_stable(&k, 1.0) && sampled_is_stable(&k, options.gain_margin)).then_some((s, cost(&k)?))
-            })
-            .collect();
+        let among = |decades: std::ops::RangeInclusive<i32>| -> Vec<(f64, f64)> {
+            decades
+                .map(|k| 10f64.powf(f64::from(k) / 10.0))
+                .filter_map(|s| {
+                    let k = self.gain(s);
+                    (sampled_is_stable(&k, 1.0) && sampled_is_stable(&k, options.gain_margin)).then_some((s, cost(&k)?))
+                })
+                .collect()
+        };
+        let mut candidates = among(-40..=0);
+        if candidates.is_empty() {
+            // the largest tr Y says nothing of small eigenvalues of Y, and R⁻¹BᵀY⁻¹ may be 10¹² too high
+            candidates = among(-160..=-41);
+        }
+        // the low gain itself is the last resort of a slow sampler
+        let low = self.gain(0.0);
+        if sampled_is_stable(&low, 1.0) && sampled_is_stable(&low, options.gain_margin) {
+            candidates.splice(0..0, cost(&low).map(|cost| (0.0, cost)));
+        }
         let least = candidates.iter().map(|&(_, cost)| cost).fold(f64::INFINITY, f64::min);
         candidates
             .iter()

@@ -98,11 +98,28 @@ pub enum SynthesisError {
     #[error("no supervised controller: {0}")]
     Supervision(#[from] SupervisionError),
     /// No gain on the high-gain segment is stable at the controller's sample time.
-    #[error("no high gain at parameter {rho:.6} is stable at a sample time of {sample_time_s} s; sample faster")]
+    #[error(
+        "no gain from the low one to R⁻¹BᵀP is stable with the margin asked for at parameter {rho:.6} and a sample time of {sample_time_s:?} s; sample faster, or ask for less gain_margin"
+    )]
     SampleTime {
         /// Parameter value.
         rho: f64,
         /// The sample time.
         sample_time_s: f64,
     },
+}
+
+impl SynthesisError {
+    /// The same error at another parameter value.
+    pub fn moved_to(mut self, parameter: f64) -> Self {
+        if let SynthesisError::Riccati { rho, .. }
+        | SynthesisError::Infeasible { rho, .. }
+        | SynthesisError::Unbounded { rho }
+        | SynthesisError::Inaccurate { rho, .. }
+        | SynthesisError::SampleTime { rho, .. } = &mut self
+        {
+            *rho = parameter;
+        }
+        self
+    }
 }

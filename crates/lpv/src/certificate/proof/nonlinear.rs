@@ -385,7 +385,7 @@ impl ClosedLoop<'_> {
     /// [Mᵀ; I] with the right singular vectors of B, rounded, in the columns of M.
     fn input_directions(&self, piece: usize) -> Option<Mat<f64>> {
         let model = crate::model::linearize(self.plant, self.parameter(piece as f64 + 0.5));
-        let vectors = symmetric_eigenvectors(&(model.b.transpose() * &model.b))?;
+        let (_, vectors) = symmetric_eigenvectors(&(model.b.transpose() * &model.b))?;
         let m = self.inputs();
         Some(Mat::from_fn(2 * m, m, |i, j| match i < m {
             true => vectors[(j, i)],

@@ -119,6 +119,11 @@ impl<'a> DoubleSum<'a> {
         }
     }
 
+    /// The (i, j) of each block of [`stability`](Self::stability).
+    pub fn stability_terms(&self) -> Vec<(usize, usize)> {
+        self.rates().iter().flat_map(|_| self.terms()).collect()
+    }
+
     /// (4.11)-(4.12) and (4.22)-(4.23), each ⪰ `margin`·I (twice it for pairs): quadratic stability with u = −L(ρ)Y(ρ)⁻¹x.
     pub fn stability(&self, l: &[Expr], margin: &Expr) -> Vec<(String, Expr)> {
         let n = self.polytope.states();
@@ -142,9 +147,25 @@ impl<'a> DoubleSum<'a> {
     /// ⎣ Lᵢ                         0     R⁻¹ ⎦      ⎣ Lᵢ + Lⱼ                                   0         2R⁻¹      ⎦
     /// ```
     pub fn performance(&self, what: &str, l: &[Expr], weights: &Weights) -> Vec<(String, Expr)> {
+        self.performance_of(&self.terms(), what, l, weights)
+    }
+
+    /// The first of the two alone, at every vertex.
+    pub fn performance_at_vertices(&self, what: &str, l: &[Expr], weights: &Weights) -> Vec<(String, Expr)> {
+        let vertices: Vec<(usize, usize)> = (0..self.polytope.len()).map(|i| (i, i)).collect();
+        self.performance_of(&vertices, what, l, weights)
+    }
+
+    fn performance_of(
+        &self,
+        terms: &[(usize, usize)],
+        what: &str,
+        l: &[Expr],
+        weights: &Weights,
+    ) -> Vec<(String, Expr)> {
         let mut blocks = Vec::new();
         for (rate_name, y_rate) in self.rates() {
-            for term @ (i, j) in self.terms() {
+            for &term @ (i, j) in terms {
                 let (y, l_sum, weight) = match i == j {
                     true => (self.y[i].clone(), l[i].clone(), 1.0),
                     false => (&self.y[i] + &self.y[j], &l[i] + &l[j], 2.0),

@@ -11,23 +11,30 @@
 //! for a nonlinear plant it is what the plant's trajectories are embedded in. Theorems 4.5, 5.3 and 5.4 are this module at
 //! single points ρ ([`frozen`]), and guarantee nothing once ρ moves.
 //!
+//! What each theorem states, for which shapes and under which assumptions, and what it does not guarantee: [`Theorem`].
+//!
 //! The controller is u = −K(ρ)x with K(ρ) = (Σ ρᵢLᵢ)(Σ ρᵢYᵢ)⁻¹, of which Kᵢ = LᵢYᵢ⁻¹ are the values at the vertices; for
 //! a common Y it is Σ ρᵢKᵢ.
 
 mod inequality;
 mod objective;
 mod rates;
+mod theorem;
+mod unstabilizable;
 
 pub use objective::Objective;
 pub use rates::rate_box_vertices;
+pub use theorem::Theorem;
+pub use unstabilizable::UnstabilizablePoint;
 
 use super::high_gain::Segment;
 use super::{CostWeights, HighGainOptions, SynthesisError};
 use crate::math::Mat;
+use crate::math::eigen::smallest_eigenvalue;
 use crate::math::matrix::{inverse_spd, symmetric_part};
 use crate::model::{FrozenModel, Polytope};
 use inequality::{DoubleSum, Unknowns, Weights};
-use lmi::{Answer, Explanation, Expr, Options, Outcome, Problem};
+use lmi::{Answer, Carrier, Explanation, Expr, Options, Outcome, Problem};
 
 /// The Lyapunov function xᵀY(ρ)⁻¹x.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,8 +88,17 @@ pub struct PolytopicDesign {
     pub answer: Answer,
     /// Why there is no solution, where there is none.
     pub explanation: Option<Explanation>,
+    /// A point of the polytope that no input can stabilise: where there is one there is no solution, whatever the solver says.
+    pub unstabilizable: Option<UnstabilizablePoint>,
     /// Y, L and gains where the problem was solved, and at the best point so far where the solver stopped short.
     pub solution: Option<Solution>,
+}
+
+impl PolytopicDesign {
+    /// Whether it is refuted, by the solver's witness or by a point that cannot be stabilised.
+    pub fn is_infeasible(&self) -> bool {
+        self.unstabilizable.is_some() || matches!(self.answer.outcome, Outcome::Infeasible(_))
+    }
 }
 
 /// The matrices of a design, one for each vertex.
@@ -100,6 +116,9 @@ pub struct Solution {
     pub auxiliary_gain: Option<Vec<Mat<f64>>>,
     /// s on K_s, of the high-gain designs.
     pub s: Option<f64>,
+    /// Smallest eigenvalue of the performance inequality of every mixture of the rows of Kᵢ and Fᵢ at every vertex, with its
+    /// name, in floating point: (5.12), (5.20) for the gain that is returned. Empty unless it is a high gain.
+    pub mixtures: Vec<(String, f64)>,
 }
 
 impl Solution {
@@ -113,8 +132,8 @@ impl Solution {
 /// The theorem of `request` for `polytope`.
 ///
 /// # Errors
-/// Problems without meaning; no high gain that is stable at the sample time. Infeasible, unbounded and inaccurate are
-/// outcomes in the answer.
+/// Problems without meaning; no high gain that is stable at the sample time, with the number of the vertex (from 0) for the
+/// parameter. Infeasible, unbounded and inaccurate are outcomes in the answer.
 ///
 /// # Panics
 /// If sizes of weights, bounds, rates or objective do not fit the polytope.
@@ -128,10 +147,19 @@ pub fn synthesize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Pol
 /// Theorems 4.5, 5.1-5.4 at single models: each is designed as if the parameter stood still there.
 ///
 /// # Errors
-/// As [`synthesize`].
+/// As [`synthesize`], with the number of the model for the parameter.
 pub fn frozen(models: &[FrozenModel], request: &PolytopicRequest) -> Result<Vec<PolytopicDesign>, SynthesisError> {
     let request = PolytopicRequest { lyapunov: Lyapunov::Common, ..request.clone() };
-    models.iter().map(|model| synthesize(&Polytope::hull(std::slice::from_ref(model)), &request)).collect()
+    let each = |(k, model)| {
+        synthesize(&Polytope::hull(std::slice::from_ref(model)), &request).map_err(|error| error.moved_to(k as f64))
+    };
+    models.iter().enumerate().map(each).collect()
+}
+
+/// Settings of the solver. The optimum of tr Y is flat: a relative gap g moves P by about √g, and 10⁻¹² gives the bound
+/// x(0)ᵀPx(0) six digits where the default, 10⁻⁹, gives four or five. Where rounding ends the iteration sooner, what was reached counts.
+fn solver() -> Options {
+    Options { gap_tolerance: 1e-12, ..Options::default() }
 }
 
 /// Theorems 4.1 and 4.2: the largest t with every inequality ⪰ tI, where tr Yᵢ ≤ n fixes the scale.
@@ -150,11 +178,58 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
         problem.positive_definite_by(format!("scale of Y{}", i + 1), trace, 0.0);
     }
     problem.maximize(&t);
-    let answer = problem.solve(&Options::default())?;
-    if answer.objective > LEAST_MARGIN || !matches!(answer.outcome, Outcome::Solved) {
+    let terms = sum.stability_terms();
+    let answer = problem.solve(&solver())?;
+    let solved = matches!(answer.outcome, Outcome::Solved);
+    if solved && answer.objective > LEAST_MARGIN {
         return finish(&problem, answer, &unknowns, None);
     }
-    // the scale allows t = 0 always: the strict problem gives the witness that there is nothing above it
+    // the scale allows t = 0 always: what there is nothing above for is said by a point, or by the strict problem's witness
+    if rests(&request.lyapunov)
+        && let Some(point) =
+            unstabilizable::vertex(polytope).or_else(|| unstabilizable::point(polytope, &terms, &answer.multipliers))
+    {
+        let explanation = Explanation { distance: 0.0, carriers: carriers(&point) };
+        return Ok(PolytopicDesign {
+            answer,
+            explanation: Some(explanation),
+            unstabilizable: Some(point),
+            solution: None,
+        });
+    }
+    match solved {
+        true => stabilize_strictly(polytope, request),
+        false => finish(&problem, answer, &unknowns, None),
+    }
+}
+
+/// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean tells.
+fn rests(lyapunov: &Lyapunov) -> bool {
+    let Lyapunov::ParameterDependent { rate_vertices } = lyapunov else { return true };
+    let mean = |i: usize| rate_vertices.iter().map(|nu| nu[i]).sum::<f64>();
+    rate_vertices.iter().any(|nu| nu.iter().all(|&rate| rate == 0.0))
+        || rate_vertices.first().is_some_and(|first| (0..first.len()).all(|i| mean(i) == 0.0))
+}
+
+/// The stability inequalities of the vertices that a point lies between, with its weights for their shares.
+fn carriers(point: &UnstabilizablePoint) -> Vec<Carrier> {
+    let count = point.weights.len();
+    let mut carriers: Vec<Carrier> = (point.weights.iter().enumerate())
+        .filter(|&(_, &share)| share > 1e-3)
+        .map(|(i, &share)| Carrier {
+            name: if count == 1 { "stability".into() } else { format!("stability at vertex {}", i + 1) },
+            share,
+            alone: None,
+        })
+        .collect();
+    carriers.sort_by(|a, b| b.share.total_cmp(&a.share));
+    carriers
+}
+
+/// The inequalities of Theorems 4.1 and 4.2 with Yᵢ ⪰ I for the scale, which they are homogeneous in, and no objective: the problem that
+/// has a witness where they contradict each other.
+fn stabilize_strictly(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
+    let n = polytope.states();
     let mut strict = Problem::new();
     let unknowns = Unknowns::new(&mut strict, polytope, &request.lyapunov);
     let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
@@ -164,7 +239,7 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
         strict.positive_definite_by(format!("Y{} ⪰ I", i + 1), *y - Expr::identity(n), 0.0);
     }
-    let answer = strict.solve(&Options::default())?;
+    let answer = strict.solve(&solver())?;
     finish(&strict, answer, &unknowns, None)
 }
 
@@ -172,6 +247,11 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
 const LEAST_MARGIN: f64 = 1e-7;
 
 /// Theorems 2.1, 4.3, 4.4, 5.1-5.4.
+///
+/// Whatever the weights and bounds, there is a solution if and only if the system can be stabilised by the same Lyapunov function:
+/// for T(Y, L) ≻ 0, (εY, εL) satisfies ε T − ε²(YQY + LᵀRL) ≻ 0 and ε ℓᵢY⁻¹ℓᵢᵀ < σᵢ²/γ for small ε > 0, and the first block of each
+/// inequality is T. Where it cannot, Y → 0 in some direction comes as near to a solution as one likes; the solver then stops short
+/// without a witness, and the stabilisation's is taken.
 fn regulate(
     polytope: &Polytope,
     request: &PolytopicRequest,
@@ -208,7 +288,13 @@ fn regulate(
         }
     }
     request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
-    let answer = problem.solve(&Options::default())?;
+    let answer = problem.solve(&solver())?;
+    if matches!(answer.outcome, Outcome::Inaccurate(_) | Outcome::Infeasible(_)) {
+        let stabilization = stabilize(polytope, request)?;
+        if stabilization.is_infeasible() {
+            return Ok(stabilization);
+        }
+    }
     let mut design = finish(&problem, answer, &unknowns, auxiliary.as_deref())?;
     let (Some(solution), Some(high_gain)) = (&mut design.solution, request.high_gain) else { return Ok(design) };
     let low = solution.auxiliary_gain.take().unwrap_or_else(|| solution.gain.clone());
@@ -234,6 +320,15 @@ fn regulate(
     solution.gain = solution.l.iter().zip(&solution.p).map(|(l, p)| l * p).collect();
     solution.auxiliary_gain = Some(low);
     solution.s = Some(s);
+    solution.mixtures = (0..1usize << polytope.inputs())
+        .flat_map(|mixture| {
+            let l: Vec<Expr> =
+                on_segment(s).iter().zip(&low_l).map(|(l, low)| super::high_gain::mixture(mixture, l, low)).collect();
+            let name = format!("mixture {mixture:0inputs$b}", inputs = polytope.inputs());
+            sum.performance_at_vertices(&name, &l, &weights)
+        })
+        .map(|(name, block)| (name, smallest_eigenvalue(&design.answer.value(&block))))
+        .collect();
     Ok(design)
 }
 
@@ -271,7 +366,7 @@ fn finish(
     unknowns: &Unknowns,
     auxiliary: Option<&[Expr]>,
 ) -> Result<PolytopicDesign, SynthesisError> {
-    let explanation = problem.explain(&answer, &Options::default())?;
+    let explanation = problem.explain(&answer, &solver())?;
     let solution = match answer.outcome {
         Outcome::Solved | Outcome::Inaccurate(_) => {
             let values =
@@ -283,6 +378,7 @@ fn finish(
                 gain: l.iter().zip(&p).map(|(l, p)| l * p).collect(),
                 auxiliary_gain: auxiliary.map(|m| values(m).iter().zip(&p).map(|(m, p)| m * p).collect()),
                 s: None,
+                mixtures: Vec::new(),
                 y,
                 l,
                 p,
@@ -290,5 +386,5 @@ fn finish(
         }
         Outcome::Infeasible(_) | Outcome::Unbounded(_) => None,
     };
-    Ok(PolytopicDesign { answer, explanation, solution })
+    Ok(PolytopicDesign { answer, explanation, unstabilizable: None, solution })
 }

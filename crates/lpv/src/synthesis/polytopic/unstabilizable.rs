@@ -1,0 +1,159 @@
+//! Points of a polytope that no input can stabilise, which refute every theorem for the polytope at once.
+//!
+//! Let w*A(ρ) = λw* with Re λ ≥ 0 and w*B(ρ) = 0 at one ρ of the polytope. Then w*(A(ρ)Y + YA(ρ)ᵀ − B(ρ)L − LᵀB(ρ)ᵀ)w = 2 Re λ w*Yw ≥ 0 for
+//! every Y ≻ 0 and L: no Lyapunov function exists at a resting ρ, and no finer division of the polytope helps. On the yaw circle
+//! of the quadrotor this is the centre, where w = e_φ. A solver meets it as an infimum that is not reached and stops short
+//! between rounding errors; here the multipliers Zᵢⱼ of its last iterate are read instead: Zᵢⱼ ≈ ρᵢρⱼwwᵀ.
+
+use crate::math::Mat;
+use crate::math::eigen::{eigenvalues, smallest_singular_vector, symmetric_eigenvectors, unstabilizable_mode};
+use crate::math::matrix::{least_squares, quadratic_form, trace};
+use crate::model::Polytope;
+use serde::Serialize;
+
+/// A point ρ of a polytope with a mode that does not decay and that no input moves.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnstabilizablePoint {
+    /// ρ, convex weights of the vertices.
+    pub weights: Vec<f64>,
+    /// λ, real and imaginary part; Re λ ≥ 0 up to rounding.
+    pub eigenvalue: [f64; 2],
+    /// Real part of w, ‖w‖ = 1: w*A(ρ) = λw*, w*B(ρ) = 0.
+    pub direction: Vec<f64>,
+    /// Imaginary part of w; empty for a real λ.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub direction_imaginary: Vec<f64>,
+    /// ‖w*[A(ρ) − λI, B(ρ)]‖, at most 10⁻¹⁰ of ‖[A, B]‖: what rounding of the model's entries is allowed to hide.
+    pub residual: f64,
+}
+
+/// Relative residual up to which a mode counts as unmoved.
+const RESIDUAL: f64 = 1e-10;
+/// A real part below zero by less than this, relatively, counts as zero: eigenvalues of defective matrices are no better.
+const DECAY: f64 = 1e-9;
+
+/// Of the largest entry, what weighs a change of ρ against the equations.
+const DAMPING: f64 = 1e-6;
+
+/// A vertex that cannot be stabilised.
+pub(super) fn vertex(polytope: &Polytope) -> Option<UnstabilizablePoint> {
+    (0..polytope.len()).find_map(|i| {
+        let (re, im) = unstabilizable_mode(polytope.a(i), polytope.b(i))?;
+        let mut weights = vec![0.0; polytope.len()];
+        weights[i] = 1.0;
+        at(polytope, &weights, [re, im]).filter(|point| holds(polytope, point))
+    })
+}
+
+/// A point of the polytope near the one that the multipliers of the stability inequalities describe: `terms` says which (i, j) each
+/// belongs to.
+pub(super) fn point(
+    polytope: &Polytope,
+    terms: &[(usize, usize)],
+    multipliers: &[Mat<f64>],
+) -> Option<UnstabilizablePoint> {
+    let n = polytope.states();
+    let mut weights = vec![0.0; polytope.len()];
+    let mut sum = Mat::zeros(n, n);
+    for (&(i, j), z) in terms.iter().zip(multipliers) {
+        weights[i] += trace(z);
+        weights[j] += trace(z);
+        sum += z;
+    }
+    let total: f64 = weights.iter().sum();
+    if total.is_nan() || total <= 0.0 {
+        return None;
+    }
+    weights.iter_mut().for_each(|weight| *weight /= total);
+    let (_, vectors) = symmetric_eigenvectors(&sum)?;
+    let mut w: Vec<f64> = (0..n).map(|i| vectors[(i, n - 1)]).collect();
+    let mut best = None;
+    // ρ, then λ and w, in turn: the start is right to the root of the solver's tolerance
+    for _ in 0..3 {
+        weights = moved(polytope, &weights, &w)?;
+        let model = polytope.at(&weights);
+        // eigenvalues of a defective A(ρ), which double integrators make, are no better than roots of rounding errors: zero is tried too
+        let real = eigenvalues(&model.a).into_iter().filter(|&(_, im)| im == 0.0).map(|(re, _)| re);
+        let tried = [0.0, quadratic_form(&model.a, &w)].into_iter().chain(real);
+        best = (tried.filter_map(|eigenvalue| at(polytope, &weights, [eigenvalue, 0.0])))
+            .min_by(|a, b| a.residual.total_cmp(&b.residual));
+        w.clone_from(&best.as_ref()?.direction);
+    }
+    best.filter(|point| holds(polytope, point))
+}
+
+/// [A − λI, B]; for complex λ = μ + iν the real [A − μI, νI, B, 0; −νI, A − μI, 0, B], which (Re w, Im w) is multiplied with from the left.
+fn pencil(a: &Mat<f64>, b: &Mat<f64>, [re, im]: [f64; 2]) -> Mat<f64> {
+    let (n, m) = (a.nrows(), b.ncols());
+    let shifted = |i: usize, j: usize| a[(i, j)] - if i == j { re } else { 0.0 };
+    if im == 0.0 {
+        return Mat::from_fn(n, n + m, |i, j| if j < n { shifted(i, j) } else { b[(i, j - n)] });
+    }
+    Mat::from_fn(2 * n, 2 * (n + m), |i, j| {
+        let (lower, i) = (i >= n, i % n);
+        match j {
+            _ if j < 2 * n && (j >= n) == lower => shifted(i, j % n),
+            _ if j < 2 * n && i == j % n => {
+                if lower {
+                    -im
+                } else {
+                    im
+                }
+            }
+            _ if j >= 2 * n && (j - 2 * n >= m) == lower => b[(i, (j - 2 * n) % m)],
+            _ => 0.0,
+        }
+    })
+}
+
+/// The weights closest to `weights` with wᵀ[A(ρ) − λI, B(ρ)] = 0 for some λ, in the least-squares sense: the part of A(ρ)ᵀw across w,
+/// B(ρ)ᵀw and Σδρᵢ are linear in the change δρ.
+fn moved(polytope: &Polytope, weights: &[f64], w: &[f64]) -> Option<Vec<f64>> {
+    let (n, m, count) = (polytope.states(), polytope.inputs(), polytope.len());
+    let row = |matrix: &Mat<f64>, j: usize| -> f64 { (0..n).map(|i| w[i] * matrix[(i, j)]).sum() };
+    let column = |a: &Mat<f64>, b: &Mat<f64>| -> Vec<f64> {
+        let flow: Vec<f64> = (0..n).map(|j| row(a, j)).collect();
+        let along: f64 = flow.iter().zip(w).map(|(x, y)| x * y).sum();
+        flow.iter().zip(w).map(|(x, y)| x - along * y).chain((0..m).map(|j| row(b, j))).collect()
+    };
+    let columns: Vec<Vec<f64>> = (0..count).map(|i| column(polytope.a(i), polytope.b(i))).collect();
+    let model = polytope.at(weights);
+    let now = column(&model.a, &model.b);
+    // the last rows keep δρ small where w, not ρ, is what is wrong
+    let damping = DAMPING * columns.iter().flatten().fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    let matrix = Mat::from_fn(n + m + 1 + count, count, |r, i| match r {
+        _ if r < n + m => columns[i][r],
+        _ if r == n + m => 1.0,
+        _ if r - (n + m + 1) == i => damping,
+        _ => 0.0,
+    });
+    let right = Mat::from_fn(matrix.nrows(), 1, |r, _| if r < n + m { -now[r] } else { 0.0 });
+    let change = least_squares(&matrix, &right)?;
+    let shifted: Vec<f64> = weights.iter().enumerate().map(|(i, weight)| (weight + change[(i, 0)]).max(0.0)).collect();
+    let total: f64 = shifted.iter().sum();
+    Some(shifted.iter().map(|weight| weight / total).collect())
+}
+
+/// The w that `eigenvalue` is nearest to a mode without input with.
+fn at(polytope: &Polytope, weights: &[f64], eigenvalue: [f64; 2]) -> Option<UnstabilizablePoint> {
+    let model = polytope.at(weights);
+    let pencil = pencil(&model.a, &model.b, eigenvalue);
+    let w = smallest_singular_vector(&pencil)?;
+    let product = |j: usize| -> f64 { w.iter().enumerate().map(|(i, w)| w * pencil[(i, j)]).sum() };
+    let residual = (0..pencil.ncols()).map(|j| product(j).powi(2)).sum::<f64>().sqrt();
+    let (real, imaginary) = w.split_at(polytope.states());
+    Some(UnstabilizablePoint {
+        weights: weights.to_vec(),
+        eigenvalue,
+        direction: real.to_vec(),
+        direction_imaginary: imaginary.to_vec(),
+        residual,
+    })
+}
+
+/// Whether the mode neither decays nor is moved.
+fn holds(polytope: &Polytope, point: &UnstabilizablePoint) -> bool {
+    let model = polytope.at(&point.weights);
+    let scale = model.a.norm_l2().max(model.b.norm_l2());
+    point.residual <= RESIDUAL * scale && point.eigenvalue[0] >= -DECAY * scale
+}
