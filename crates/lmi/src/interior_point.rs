@@ -24,9 +24,10 @@ pub(crate) const SOLVED_GAP: f64 = 1e-7;
 pub(crate) const SOLVED_UNCERTAINTY: f64 = 1e-6;
 /// Relative gap at which a point is kept for neighbouring problems to begin at.
 const CENTRAL: f64 = 3e-2;
-/// Relative gap from which on x should no longer change by orders of magnitude, and growth that shows that no x attains the optimum.
-const SETTLED: f64 = 1e-2;
-const RUNAWAY: f64 = 1e5;
+/// Where x still grows by this factor in each of so many last iterations no x attains the optimum: close to one that is attained x hardly
+/// moves.
+const GROWTH: f64 = 1.25;
+const GROWING: usize = 4;
 /// A multiplier is a witness of infeasibility when its residual is this small against the dual objective: rounding level.
 const CERTIFICATE: f64 = 1e-14;
 
@@ -166,8 +167,8 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let mut best_witness = f64::INFINITY;
     let mut interior = None;
     let mut centre = None;
-    // ‖x‖ when the gap was first small.
-    let mut settled = None;
+    // ‖x‖ of every iteration.
+    let mut sizes: Vec<f64> = Vec::new();
     let ending = loop {
         it.update_residuals();
         let status = it.status();
@@ -193,9 +194,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         if it.feasible && gap <= CENTRAL && centre.is_none() {
             centre = Some(it.centre());
         }
-        if it.feasible && gap <= SETTLED {
-            settled = settled.or(Some(norm(&it.x)));
-        }
+        sizes.push(norm(&it.x));
         let tolerance = options.feasibility_tolerance;
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
         if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance && certain {
@@ -237,9 +236,9 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         },
         other => other,
     };
-    let grown = |before: f64| best.as_ref().is_some_and(|(.., point)| norm(&point.x) > RUNAWAY * before.max(1.0));
+    let grows = sizes.len() > GROWING && sizes[sizes.len() - 1 - GROWING..].windows(2).all(|w| w[1] > GROWTH * w[0]);
     let ending = match ending {
-        Ending::Converged if settled.is_some_and(grown) => Ending::Stopped(InaccurateReason::NotAttained),
+        Ending::Converged if grows => Ending::Stopped(InaccurateReason::NotAttained),
         other => other,
     };
     let (_, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));

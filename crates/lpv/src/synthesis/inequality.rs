@@ -61,9 +61,12 @@ pub(super) fn unsaturated(y: &Expr, row: Expr, sigma: f64, gamma: f64) -> Expr {
     Expr::symmetric_blocks(vec![vec![Expr::constant(bound)], vec![row.t(), y.clone()]])
 }
 
+/// Relative gap to aim for: the back-off of P makes up for what is left.
+const GAP: f64 = 1e-9;
+
 /// Solve, and turn every outcome but `Solved` into an error that says where.
 pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisError> {
-    let answer = problem.solve(&Options::default())?;
+    let answer = problem.solve(&Options { gap_tolerance: GAP, ..Options::default() })?;
     match &answer.outcome {
         Outcome::Solved => Ok(answer),
         Outcome::Infeasible(witness) => {
