@@ -99,12 +99,11 @@ impl Problem {
     }
 }
 
+/// Solves for the least relaxation of the inequalities that are picked.
+type Relax<'a> = dyn Fn(&dyn Fn(usize) -> bool) -> Result<Answer, Error> + 'a;
+
 /// The explanation of an infeasible answer, from what solves for the least relaxation of some inequalities.
-pub(crate) fn explain(
-    answer: &Answer,
-    names: &[String],
-    relax: &dyn Fn(&dyn Fn(usize) -> bool) -> Result<Answer, Error>,
-) -> Result<Option<Explanation>, Error> {
+pub(crate) fn explain(answer: &Answer, names: &[String], relax: &Relax<'_>) -> Result<Option<Explanation>, Error> {
     if !matches!(answer.outcome, Outcome::Infeasible(_)) {
         return Ok(None);
     }
