@@ -167,15 +167,15 @@ pub fn design(
         return moving::design(spec, plant, request, options, &model, sigma.as_deref(), progress);
     }
     let mut points: Vec<FrozenDesign> = match request.method {
-        Method::Lpvqr => map_grid(&model, |point, _| lpvqr::frozen(point, weights).inspect(count))?,
+        Method::Lpvqr => map_grid(&model, |point| lpvqr::frozen(point, weights).inspect(count))?,
         Method::Slpvqr { gamma } => {
             let sigma = sigma()?;
-            map_grid(&model, |point, near| slpvqr::frozen(point, weights, &sigma, gamma, near).inspect(count))?
+            map_grid(&model, |point| slpvqr::frozen(point, weights, &sigma, gamma).inspect(count))?
         }
         Method::HighGainSlpvqr { gamma, high_gain: options } => {
             let sigma = sigma()?;
-            let segments = map_grid(&model, |point, near| {
-                let segment = high_gain::segment(point, weights, &sigma, gamma, near)?;
+            let segments = map_grid(&model, |point| {
+                let segment = high_gain::segment(point, weights, &sigma, gamma)?;
                 let s = segment.choose(point, weights, Some(request.sample_time_s), &options)?;
                 progress(done.fetch_add(1, Ordering::Relaxed) + 1);
                 Ok((segment, s))
@@ -248,19 +248,12 @@ fn symmetric_bound(limits: &InputLimits, operating_input: &[f64]) -> Result<Vec<
     }
 }
 
-/// Grid points that are solved one from the other. Fixed, so that results do not depend on the number of threads.
-const NEIGHBOURS: usize = 4;
-
 fn map_grid<T: Send>(
     model: &GridModel,
-    solve: impl Fn(&FrozenModel, &mut Option<lmi::Answer>) -> Result<T, SynthesisError> + Sync + Send,
+    solve: impl Fn(&FrozenModel) -> Result<T, SynthesisError> + Sync + Send,
 ) -> Result<Vec<T>, SynthesisError> {
-    let one_from_the_other = |points: &[FrozenModel]| {
-        let mut neighbour = None;
-        points.iter().map(|point| solve(point, &mut neighbour)).collect::<Vec<_>>()
-    };
     // collected in full first: rayon's early exit would report whichever point failed first in time
-    let results: Vec<_> = model.points.par_chunks(NEIGHBOURS).flat_map_iter(one_from_the_other).collect();
+    let results: Vec<_> = model.points.par_iter().map(solve).collect();
     results.into_iter().collect()
 }
 

@@ -23,7 +23,7 @@
 //! each mixture is then verified at it.
 
 use super::back_off::mixtures_hold;
-use super::inequality::{InverseWeights, performance, solve_near, unsaturated};
+use super::inequality::{InverseWeights, performance, solve, unsaturated};
 use super::slpvqr::not_definite;
 use super::{CostWeights, FrozenDesign, RateBounded, SynthesisError};
 use crate::math::eigen::spectral_radius;
@@ -31,7 +31,7 @@ use crate::math::hold::discretize;
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
 use crate::math::{Mat, lyapunov, riccati};
 use crate::model::FrozenModel;
-use lmi::{Answer, Expr, Problem};
+use lmi::{Expr, Problem};
 use serde::{Deserialize, Serialize};
 
 /// How the gain of a high-gain design is chosen.
@@ -72,13 +72,12 @@ pub(super) fn mixture(vertex: usize, l: &Expr, m: &Expr) -> Expr {
     selector(1) * l + selector(0) * m
 }
 
-/// Theorem 5.4 at one parameter value: all 2^m mixtures as inequalities. Begins at the neighbour's answer and leaves its own there.
+/// Theorem 5.4 at one parameter value: all 2^m mixtures as inequalities.
 pub(super) fn segment(
     model: &FrozenModel,
     weights: &CostWeights,
     sigma: &[f64],
     gamma: f64,
-    neighbour: &mut Option<Answer>,
 ) -> Result<Segment, SynthesisError> {
     let (n, inputs) = (model.a.nrows(), model.b.ncols());
     let inverse = InverseWeights::new(weights);
@@ -94,7 +93,7 @@ pub(super) fn segment(
         problem.positive_definite(format!("input {} unsaturated", i + 1), unsaturated(&y, m.row(i), bound, gamma));
     }
     problem.maximize(&y.trace());
-    let answer = solve_near(&problem, model.rho, neighbour)?;
+    let answer = solve(&problem, model.rho)?;
 
     let y = symmetric_part(&answer.value(&y));
     let p = inverse_spd(&y).ok_or_else(|| not_definite(model.rho))?;

@@ -66,21 +66,7 @@ const GAP: f64 = 1e-9;
 
 /// Solve, and turn every outcome but `Solved` into an error that says where.
 pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisError> {
-    solve_near(problem, rho, &mut None)
-}
-
-/// The same from the answer at a neighbouring parameter, if there is one, whose place the new answer takes.
-pub(super) fn solve_near(
-    problem: &Problem,
-    rho: f64,
-    neighbour: &mut Option<Answer>,
-) -> Result<Answer, SynthesisError> {
-    let options = Options { gap_tolerance: GAP, ..Options::default() };
-    let answer = match neighbour.take() {
-        Some(neighbour) => problem.solve_near(&neighbour, &options)?,
-        None => problem.solve(&options)?,
-    };
-    *neighbour = Some(answer.clone());
+    let answer = problem.solve(&Options { gap_tolerance: GAP, ..Options::default() })?;
     match &answer.outcome {
         Outcome::Solved => Ok(answer),
         Outcome::Infeasible(witness) => {

@@ -20,7 +20,7 @@ pub fn covering_level(
     from: f64,
 ) -> Result<Option<f64>, SynthesisError> {
     let covers = |gamma: f64| {
-        slpvqr::frozen(model, weights, sigma, gamma, &mut None).map(|design| quadratic_form(&design.p, error) <= gamma)
+        slpvqr::frozen(model, weights, sigma, gamma).map(|design| quadratic_form(&design.p, error) <= gamma)
     };
     let (mut low, mut high) = (from, from);
     while !covers(high)? {

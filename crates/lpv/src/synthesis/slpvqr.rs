@@ -1,19 +1,18 @@
 //! SLPVQR: the quadratic regulator under input saturation, low gain, Theorem 5.3 (Theorem 5.1 without parameter).
 
-use super::inequality::{InverseWeights, performance, solve_near, unsaturated};
+use super::inequality::{InverseWeights, performance, solve, unsaturated};
 use super::{CostWeights, FrozenDesign, SynthesisError};
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
 use crate::model::FrozenModel;
-use lmi::{Answer, Problem};
+use lmi::Problem;
 
 /// Theorem 5.3 at one parameter value: the largest tr Y such that u = −Kx meets the cost bound xᵀPx and does not
-/// saturate, |kᵢx| ≤ σᵢ, on the ellipsoid xᵀPx ≤ γ. Begins at the neighbour's answer and leaves its own there.
+/// saturate, |kᵢx| ≤ σᵢ, on the ellipsoid xᵀPx ≤ γ.
 pub(super) fn frozen(
     model: &FrozenModel,
     weights: &CostWeights,
     sigma: &[f64],
     gamma: f64,
-    neighbour: &mut Option<Answer>,
 ) -> Result<FrozenDesign, SynthesisError> {
     let (n, m) = (model.a.nrows(), model.b.ncols());
     let mut problem = Problem::new();
@@ -24,7 +23,7 @@ pub(super) fn frozen(
         problem.positive_definite(format!("input {} unsaturated", i + 1), unsaturated(&y, l.row(i), bound, gamma));
     }
     problem.maximize(&y.trace());
-    let answer = solve_near(&problem, model.rho, neighbour)?;
+    let answer = solve(&problem, model.rho)?;
 
     let y = symmetric_part(&answer.value(&y));
     let p = inverse_spd(&y).ok_or_else(|| not_definite(model.rho))?;
