@@ -8,8 +8,8 @@
 
 use crate::Options;
 use crate::answer::{Balancing, InaccurateReason, Residuals};
-use crate::block::{Block, Program};
-use crate::interior_point::{self, Centre, Ending, Solution};
+use crate::block::Program;
+use crate::interior_point::{self, Ending, Solution};
 
 /// Rounds of conjugate gradients for the logarithms of the factors, which need no more than one digit.
 const ROUNDS: usize = 40;
@@ -140,14 +140,6 @@ fn scale_matrices(program: &Program, factors: &Factors, matrices: &mut [Vec<f64>
             *value = scaled(d[i] * d[j], *value);
         }
     }
-}
-
-/// Whether a point has the shape of these blocks.
-fn fits(blocks: &[Block], warm: &Centre) -> bool {
-    let of = |matrices: &[Vec<f64>]| {
-        matrices.len() == blocks.len() && matrices.iter().zip(blocks).all(|(m, b)| m.len() == b.constant().len())
-    };
-    of(&warm.s) && of(&warm.z)
 }
 
 /// Undoes what [`apply`] did.
@@ -316,7 +308,7 @@ fn apply(program: &mut Program, factors: &Factors) -> Option<f64> {
     program.objective.iter_mut().zip(&factors.unknowns).for_each(|(c, s)| *c *= s * omega);
     program.scale.copy_from_slice(&factors.unknowns);
     (program.omega, program.balanced) = (omega, true);
-    if let Some(mut warm) = program.warm.take_if(|warm| fits(&program.blocks, warm)) {
+    if let Some(mut warm) = program.warm.take() {
         warm.x.iter_mut().zip(&factors.unknowns).for_each(|(x, s)| *x /= s);
         scale_matrices(program, factors, &mut warm.s, |d, value| value * d);
         scale_matrices(program, factors, &mut warm.z, |d, value| value * omega / d);

@@ -21,7 +21,7 @@ use std::time::Instant;
 const BACK_OFF: f64 = 1e-6;
 /// Largest relative gap of a point that is called solved, and what the dual residual may take from it.
 pub(crate) const SOLVED_GAP: f64 = 1e-7;
-pub(crate) const SOLVED_UNCERTAINTY: f64 = 1e-6;
+const SOLVED_UNCERTAINTY: f64 = 1e-6;
 /// Relative gap at which a point is kept for neighbouring problems to begin at.
 const CENTRAL: f64 = 3e-2;
 /// Where x still grows by this factor in each of so many last iterations no x attains the optimum: close to one that is attained x hardly
@@ -54,6 +54,17 @@ pub(crate) struct Centre {
     pub x: Vec<f64>,
     pub s: Vec<Vec<f64>>,
     pub z: Vec<Vec<f64>>,
+}
+
+impl Centre {
+    /// Whether the point has the shape of a program.
+    pub fn fits(&self, program: &Program) -> bool {
+        let blocks = &program.blocks;
+        let of = |matrices: &[Vec<f64>]| {
+            matrices.len() == blocks.len() && matrices.iter().zip(blocks).all(|(m, b)| m.len() == b.constant().len())
+        };
+        self.x.len() == program.objective.len() && of(&self.s) && of(&self.z)
+    }
 }
 
 /// How the iteration ended.
@@ -280,14 +291,8 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Begins at a point of a neighbouring problem, if it is positive definite and has this problem's shape.
+    /// Begins at a point of a neighbouring problem, if it is positive definite.
     fn begin_at(&mut self, centre: &Centre) {
-        let fits = |matrices: &[Vec<f64>]| {
-            matrices.len() == self.blocks.len() && matrices.iter().zip(&self.blocks).all(|(m, b)| m.len() == b.s.len())
-        };
-        if centre.x.len() != self.x.len() || !fits(&centre.s) || !fits(&centre.z) {
-            return;
-        }
         let before: Vec<(Vec<f64>, Vec<f64>)> = self.blocks.iter().map(|b| (b.s.clone(), b.z.clone())).collect();
         let pairs = centre.s.iter().zip(&centre.z);
         let scratch = &mut self.scratch;

@@ -1,13 +1,13 @@
 //! Problems: unknowns, inequalities and an objective.
 
-use crate::answer::{Answer, BlockReport, InaccurateReason, Outcome};
+use crate::answer::{Answer, BlockReport, InaccurateReason, OptimumBound, Outcome};
 use crate::expression::{Expr, Unknown};
 use crate::interior_point::Centre;
 use crate::lowering::{Layout, lower};
 use crate::report::{Original, Translation, report, verify};
 use crate::rigorous::{Enclosure, Gradient};
 use crate::sdpa::{BlockShape, Coefficient, Sdp};
-use crate::verification::Spectrum;
+use crate::verification::{Spectrum, largest_entry};
 use crate::{Error, Mat, Options, balancing};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -187,7 +187,11 @@ impl Problem {
         let gap = (objective - answer.dual_objective).abs();
         let mut residuals = answer.residuals;
         residuals.gap = gap / (1.0 + objective.abs() + answer.dual_objective.abs());
-        Answer { blocks, objective, gap, residuals, values, ..answer }
+        // The bound speaks of multiples of the point that it was proved at.
+        let shrinks = answer.values.iter().zip(&values).map(|(x, y)| largest_entry(x) / largest_entry(y));
+        let share = shrinks.fold(1.0, f64::min);
+        let optimum_bound = answer.optimum_bound.map(|bound| OptimumBound { reach: share * bound.reach, ..bound });
+        Answer { blocks, objective, gap, optimum_bound, residuals, values, ..answer }
     }
 
     /// With bounds on the unknowns, and the best-conditioned point after the optimum, where the options ask for them.
@@ -224,7 +228,7 @@ impl Problem {
 
     fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {
         let mut lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
-        lowered.program.warm = centre.cloned();
+        lowered.program.warm = centre.filter(|centre| centre.fits(&lowered.program)).cloned();
         let costs = lowered.program.objective.clone();
         let (result, balancing) = balancing::solve(lowered.program, &lowered.margins, options);
         let translation = Translation {

@@ -244,10 +244,14 @@ fn symmetric(m: &Mat<f64>) -> Mat<f64> {
 /// A symmetric matrix that is proved to be positive definite (or zero), moved up by a few rounding errors if need be.
 fn made_definite(z: &Mat<f64>) -> Option<Mat<f64>> {
     let mut z = symmetric(z);
+    let proved = |z: &Mat<f64>| largest_entry(z) == 0.0 || Enclosure::of_matrix(z).exceeds(0.0);
+    if proved(&z) {
+        return Some(z);
+    }
     let spectrum = Spectrum::of(&z);
     let rounding = spectrum.rounding.max(f64::EPSILON * spectrum.largest);
     for _ in 0..4 {
-        if largest_entry(&z) == 0.0 || Enclosure::of_matrix(&z).exceeds(0.0) {
+        if proved(&z) {
             return Some(z);
         }
         (0..z.nrows()).for_each(|i| z[(i, i)] += rounding);

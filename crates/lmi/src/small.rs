@@ -6,7 +6,7 @@ pub(crate) const MOST: usize = 40;
 /// Columns are padded to a multiple of this, at least the widest vector register.
 const PADDING: usize = 8;
 
-/// Scratch memory, n padded columns.
+/// Scratch memory: room for [`MOST`] columns of [`MOST`] vectors, whatever the register.
 pub(crate) fn scratch() -> Vec<f64> {
     vec![0.0; MOST * MOST * PADDING]
 }

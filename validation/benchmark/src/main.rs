@@ -13,6 +13,9 @@ use std::time::Instant;
 
 type Failure = Box<dyn std::error::Error>;
 
+/// A solver that has run for longer than this on a problem is not run again.
+const MOST_SECONDS: f64 = 60.0;
+
 /// One row of the table.
 struct Row {
     solver: String,
@@ -58,6 +61,9 @@ fn compare(file: &Path, repetitions: usize, scratch: &Path) -> Result<(), Failur
         solvers.iter().map(|s| Row { solver: s.name().to_owned(), times: Vec::new(), point: None }).collect();
     for _ in 0..repetitions {
         for (solver, row) in solvers.iter().zip(&mut rows) {
+            if row.times.iter().sum::<f64>() > MOST_SECONDS {
+                continue;
+            }
             let mut command = solver.command(file, scratch);
             let started = Instant::now();
             let output = command.output().map_err(|error| format!("{}: {error}", solver.name()))?;

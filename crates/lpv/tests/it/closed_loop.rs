@@ -1,31 +1,16 @@
 //! Flights on the nonlinear quadrotor: costs and settling times recomputed elsewhere, order of convergence, divergence.
 
+use crate::flight;
 use crate::quadrotor::{designed, limits, plant, weights};
 use lpv::controller::InputLimits;
-use lpv::sim::{Flight, Outcome, Performance, Reference, SetPoint, Simulation, performance};
+use lpv::sim::{Flight, Outcome, Performance, Reference, SetPoint};
 use lpv::synthesis::{Design, HighGainOptions, Method, ScheduleKind};
 
 fn fly(design: &Design, targets: Vec<(usize, f64)>, duration_s: f64, steps_per_sample: usize) -> (Flight, Performance) {
     let plant = plant();
     let weights = weights();
     let reference = Reference::new(vec![0.0; 12], vec![SetPoint { time_s: 0.0, targets }]);
-    let simulation = Simulation {
-        plant: &*plant,
-        initial_state: vec![0.0; 12],
-        reference: reference.clone(),
-        duration_s,
-        sample_time_s: design.sample_time_s,
-        steps_per_sample,
-        state_weight: &weights.q,
-        input_weight: &weights.r,
-        noise: None,
-        estimate: false,
-        seed: 0,
-        run: 0,
-    };
-    let flight = simulation.fly(&design.controller);
-    let performance = performance(plant.description(), &reference, &flight);
-    (flight, performance)
+    flight::fly(&*plant, design, &weights, vec![0.0; 12], reference, duration_s, steps_per_sample)
 }
 
 /// Section 6.2.2, a step of 1 m in x over 60 s: actual cost and 5 % settling time of each controller.

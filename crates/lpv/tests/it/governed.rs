@@ -1,12 +1,13 @@
 //! Supervised controllers: the governed reference is a motion of the LPV model, the error never leaves the certified set, set
 //! points far outside it are reached, and families of nested sets keep the bound of the member that a flight starts with.
 
+use crate::flight;
 use crate::quadrotor::{limits, plant, spec, weights};
 use lpv::controller::{InputLimits, SetEvaluator};
 use lpv::math::matrix::{diagonal, identity, quadratic_form};
 use lpv::math::scalar::Scalar;
 use lpv::plant::{Description, Equations, LinearParameters, Plant, PlantSpec, Quadrotor, QuadrotorParameters};
-use lpv::sim::{Flight, Outcome, Performance, Reference, SetPoint, Simulation, performance};
+use lpv::sim::{Flight, Outcome, Performance, Reference, SetPoint};
 use lpv::synthesis::{
     CostWeights, Design, DesignRequest, GovernorOptions, HighGainOptions, Method, RateBoundedOptions, Supervision,
     SupervisionError, SynthesisError, design_supervised,
@@ -88,23 +89,7 @@ fn fly(
 ) -> (Flight, Performance) {
     let set_points = set_points.into_iter().map(|(time_s, targets)| SetPoint { time_s, targets }).collect();
     let reference = Reference::new(vec![0.0; initial_state.len()], set_points);
-    let simulation = Simulation {
-        plant,
-        initial_state,
-        reference: reference.clone(),
-        duration_s,
-        sample_time_s: design.sample_time_s,
-        steps_per_sample: 1,
-        state_weight: &weights.q,
-        input_weight: &weights.r,
-        noise: None,
-        estimate: false,
-        seed: 0,
-        run: 0,
-    };
-    let flight = simulation.fly(&design.controller);
-    let performance = performance(plant.description(), &reference, &flight);
-    (flight, performance)
+    flight::fly(plant, design, weights, initial_state, reference, duration_s, 1)
 }
 
 fn peak_share(flight: &Flight) -> f64 {

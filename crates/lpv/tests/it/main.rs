@@ -3,6 +3,7 @@
 mod closed_loop;
 mod costs;
 mod filter;
+mod flight;
 mod governed;
 mod jacobians;
 mod layering;
