@@ -51,7 +51,9 @@ pub fn run(file: &Path) -> Result<(), super::Failure> {
         }
     }
     let a = CscMatrix::new_from_triplets(rows, m, is, js, values);
-    let settings = DefaultSettingsBuilder::default().verbose(false).max_threads(1).build()?;
+    // With chordal decomposition Clarabel 0.11.1 calls 18.056 the optimum of control1, which is 17.785.
+    let settings =
+        DefaultSettingsBuilder::default().verbose(false).max_threads(1).chordal_decomposition_enable(false).build()?;
     let mut solver = DefaultSolver::new(&CscMatrix::zeros((m, m)), &sdp.objective, &a, &b, &cones, settings)?;
     solver.solve();
     let solution = &solver.solution;
