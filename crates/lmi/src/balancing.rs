@@ -29,10 +29,8 @@ const EXTREME: f64 = 400.0;
 /// `dᵢ dⱼ s_k |F_k,ij|` is to be 1.
 #[derive(Clone, Copy, Debug)]
 struct Equation {
-    i: usize,
-    j: usize,
-    /// Place of s_k among the variables.
-    unknown: Option<usize>,
+    /// Those of dᵢ, dⱼ and s_k among the variables; of the known part the place behind the last one, whose s is 1.
+    places: [u32; 3],
     /// log₂|F_k,ij|.
     log: f64,
 }
@@ -42,6 +40,8 @@ struct Factors {
     /// The diagonal of D, block after block.
     rows: Vec<f64>,
     unknowns: Vec<f64>,
+    /// log₂ of both, and of the 1 that the known part is multiplied by.
+    logs: Vec<f64>,
 }
 
 /// Solves a program with the margin of each block, balanced where its data or the course of the iteration ask for it.
@@ -164,10 +164,8 @@ fn spread(program: &Program, equations: &[Equation]) -> f64 {
     // Rows of the coefficient matrices, unknowns, rows of the known parts.
     let mut largest = vec![f64::NEG_INFINITY; unknowns + rows];
     for e in equations {
-        let places = match e.unknown {
-            Some(k) => [e.i, e.j, k],
-            None => [unknowns + e.i, unknowns + e.j, unknowns + e.j],
-        };
+        let [i, j, k] = e.places.map(|at| at as usize);
+        let places = if k < unknowns { [i, j, k] } else { [unknowns + i, unknowns + j, unknowns + j] };
         places.into_iter().for_each(|at| largest[at] = largest[at].max(e.log));
     }
     let costs = program.objective.iter().map(|c| c.abs().log2()).fold(f64::NEG_INFINITY, f64::max);
@@ -178,13 +176,18 @@ fn spread(program: &Program, equations: &[Equation]) -> f64 {
 
 fn equations(program: &Program) -> Vec<Equation> {
     let rows: usize = program.blocks.iter().map(|block| block.size()).sum();
+    let scales: Vec<f64> = program.scale.iter().map(|s| s.log2()).collect();
     let (mut out, mut first) = (Vec::new(), 0);
     for block in &program.blocks {
         block.entries(&mut |i, j, unknown, value| {
-            let scale = unknown.map_or(1.0, |unknown| program.scale[unknown]);
-            let log = value.abs().log2() + scale.log2();
-            if value != 0.0 && log.is_finite() {
-                out.push(Equation { i: first + i, j: first + j, unknown: unknown.map(|k| rows + k), log });
+            if value == 0.0 {
+                return;
+            }
+            let scale = unknown.map_or(0.0, |unknown| scales[unknown]);
+            let log = if value.abs() == 1.0 { scale } else { value.abs().log2() + scale };
+            if log.is_finite() {
+                let unknown = rows + unknown.unwrap_or(program.objective.len());
+                out.push(Equation { places: [first + i, first + j, unknown].map(|at| at as u32), log });
             }
         });
         first += block.size();
@@ -226,34 +229,27 @@ fn factors(program: &Program, equations: &[Equation]) -> Factors {
 
 /// log₂ of what an entry is multiplied by.
 fn scaling_log(e: &Equation, factors: &Factors) -> f64 {
-    let unknown = e.unknown.map_or(0.0, |k| factors.unknowns[k - factors.rows.len()].log2());
-    factors.rows[e.i].log2() + factors.rows[e.j].log2() + unknown
+    let [i, j, k] = e.places.map(|at| factors.logs[at as usize]);
+    i + j + k
 }
 
 /// The least-squares solution by conjugate gradients on the normal equations, preconditioned by their diagonal.
 fn least_squares(program: &Program, equations: &[Equation]) -> Factors {
     let rows: usize = program.blocks.iter().map(|block| block.size()).sum();
-    let n = rows + program.objective.len();
-    let spread = |e: &Equation, value: f64, out: &mut [f64]| {
-        out[e.i] += value;
-        out[e.j] += value;
-        if let Some(k) = e.unknown {
-            out[k] += value;
-        }
-    };
-    let gather = |e: &Equation, v: &[f64]| v[e.i] + v[e.j] + e.unknown.map_or(0.0, |k| v[k]);
+    // The last one stays zero.
+    let n = rows + program.objective.len() + 1;
     let (mut diagonal, mut residual) = (vec![0.0; n], vec![0.0; n]);
     for e in equations {
-        diagonal[e.i] += if e.i == e.j { 4.0 } else { 1.0 };
-        diagonal[e.j] += if e.i == e.j { 0.0 } else { 1.0 };
-        if let Some(k) = e.unknown {
-            diagonal[k] += 1.0;
-        }
-        spread(e, -e.log.clamp(-EXTREME, EXTREME), &mut residual);
+        let [i, j, k] = e.places.map(|at| at as usize);
+        diagonal[i] += if i == j { 4.0 } else { 1.0 };
+        diagonal[j] += if i == j { 0.0 } else { 1.0 };
+        diagonal[k] += 1.0;
+        e.places.into_iter().for_each(|at| residual[at as usize] -= e.log.clamp(-EXTREME, EXTREME));
     }
+    (diagonal[n - 1], residual[n - 1]) = (0.0, 0.0);
     let precondition =
         |r: &[f64]| -> Vec<f64> { r.iter().zip(&diagonal).map(|(r, d)| if *d > 0.0 { r / d } else { 0.0 }).collect() };
-    let mut v = vec![0.0; n];
+    let (mut v, mut image) = (vec![0.0; n], vec![0.0; n]);
     let mut direction = precondition(&residual);
     let mut size = crate::dense::dot(&residual, &direction);
     let start = size;
@@ -261,10 +257,15 @@ fn least_squares(program: &Program, equations: &[Equation]) -> Factors {
         if size <= 1e-8 * start || size <= 1e-6 {
             break;
         }
-        let mut image = vec![0.0; n];
+        image.fill(0.0);
         for e in equations {
-            spread(e, gather(e, &direction), &mut image);
+            let [i, j, k] = e.places.map(|at| at as usize);
+            let sum = direction[i] + direction[j] + direction[k];
+            image[i] += sum;
+            image[j] += sum;
+            image[k] += sum;
         }
+        image[n - 1] = 0.0;
         let step = size / crate::dense::dot(&direction, &image);
         if !step.is_finite() {
             break;
@@ -275,11 +276,12 @@ fn least_squares(program: &Program, equations: &[Equation]) -> Factors {
         let last = std::mem::replace(&mut size, crate::dense::dot(&residual, &next));
         direction.iter_mut().zip(next).for_each(|(d, n)| *d = n + size / last * *d);
     }
-    let power = |v: &f64, most: f64| v.round().clamp(-most, most).exp2();
-    Factors {
-        rows: v[..rows].iter().map(|v| power(v, MOST)).collect(),
-        unknowns: v[rows..].iter().map(|v| power(v, 2.0 * MOST)).collect(),
+    for (at, v) in v.iter_mut().enumerate() {
+        let most = if at < rows { MOST } else { 2.0 * MOST };
+        *v = v.round().clamp(-most, most);
     }
+    let powers = |logs: &[f64]| logs.iter().map(|log| log.exp2()).collect();
+    Factors { rows: powers(&v[..rows]), unknowns: powers(&v[rows..n - 1]), logs: v }
 }
 
 /// Scales the program and gives the factor ω of the objective; `None`, and the program as it was, when that would overflow.

@@ -173,7 +173,8 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         it.begin_at(centre);
     }
     let mut log: Vec<IterationLog> = Vec::new();
-    let mut best: Option<(f64, Status, Point)> = None;
+    let mut best: Option<(f64, Status)> = None;
+    let mut point = Point::default();
     let mut since_progress = 0;
     let mut best_witness = f64::INFINITY;
     let mut interior = None;
@@ -187,7 +188,8 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         let improves = best.as_ref().is_none_or(|(best, ..)| merit < *best);
         let much = best.as_ref().is_none_or(|(best, ..)| merit < 0.9 * best);
         if improves {
-            best = Some((merit, status, it.point()));
+            best = Some((merit, status));
+            it.copy_point(&mut point);
         }
         log.push(IterationLog {
             objective: status.objective,
@@ -200,7 +202,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         });
         let Residuals { primal, dual, gap, uncertainty } = status.residuals;
         if it.feasible && gap > BACK_OFF {
-            interior = Some(it.x.clone());
+            copy(&it.x, interior.get_or_insert_default());
         }
         if it.feasible && gap <= CENTRAL && centre.is_none() {
             centre = Some(it.centre());
@@ -213,11 +215,13 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         }
         let witness = it.witness_residual(&status);
         if witness <= CERTIFICATE || (witness <= NEAR_CERTIFICATE && it.complete_witness()) {
-            best = Some((merit, status, it.point()));
+            best = Some((merit, status));
+            it.copy_point(&mut point);
             break Ending::PrimalInfeasible;
         }
         if let Some(ray) = it.ray(&status) {
-            best = Some((merit, status, it.point()));
+            best = Some((merit, status));
+            it.copy_point(&mut point);
             break Ending::DualInfeasible(ray);
         }
         since_progress = if much || witness < 0.9 * best_witness { 0 } else { since_progress + 1 };
@@ -252,7 +256,8 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         Ending::Converged if grows => Ending::Stopped(InaccurateReason::NotAttained),
         other => other,
     };
-    let (_, status, point) = best.unwrap_or_else(|| (f64::INFINITY, it.status(), it.point()));
+    // Every course has a first point.
+    let status = best.map_or_else(|| it.status(), |(_, status)| status);
     let units = program.scale.clone();
     let Status { residuals, dual_objective, .. } = status;
     Solution { point, ending, residuals, dual_objective, interior, centre, units, log }
@@ -312,8 +317,10 @@ impl<'a> Iteration<'a> {
         Centre { x: self.x.clone(), s: of(|b| &b.s), z: of(|b| &b.z) }
     }
 
-    fn point(&self) -> Point {
-        Point { x: self.x.clone(), z: self.blocks.iter().map(|b| b.z.clone()).collect() }
+    fn copy_point(&self, to: &mut Point) {
+        copy(&self.x, &mut to.x);
+        to.z.resize_with(self.blocks.len(), Vec::new);
+        to.z.iter_mut().zip(&self.blocks).for_each(|(to, block)| copy(&block.z, to));
     }
 
     /// R = F(x) − S, closed exactly as soon as F(x) itself is positive definite; A(Z).
@@ -498,6 +505,11 @@ impl<'a> Iteration<'a> {
         }
         None
     }
+}
+
+fn copy(from: &[f64], to: &mut Vec<f64>) {
+    to.clear();
+    to.extend_from_slice(from);
 }
 
 /// v ← s∘v.

@@ -5,6 +5,7 @@
 //! LMIs of control that leaves one stack per block.
 
 use crate::block::{Block, DenseBlock, DiagonalBlock, Program};
+use crate::dense::{axpy, dot};
 use crate::expression::{Expr, Shape, Term, Unknown};
 use crate::factored::{Factored, Stack};
 use crate::problem::{Inequality, Sense};
@@ -177,16 +178,12 @@ fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error
     if rows != columns {
         return Err(Error::NotSquare { name: inequality.name.clone(), rows, columns });
     }
-    let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut next = patternless();
+    if rows <= MOST_PROBED && surely_symmetric(expression, layout, &mut next) {
+        return Ok(());
+    }
     for probe in 0..3 {
-        let x: Vec<f64> = (0..layout.len())
-            .map(|_| {
-                seed ^= seed << 13;
-                seed ^= seed >> 7;
-                seed ^= seed << 17;
-                if probe == 0 { 0.0 } else { (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5 }
-            })
-            .collect();
+        let x: Vec<f64> = (0..layout.len()).map(|_| if probe == 0 { 0.0 } else { next() }).collect();
         let values = layout.matrices(&x);
         let (mut worst, mut at, mut scale) = (0.0_f64, (0, 0), 0.0_f64);
         let mut f = (*expression.constant).clone();
@@ -214,6 +211,71 @@ fn check_symmetric(inequality: &Inequality, layout: &Layout) -> Result<(), Error
         }
     }
     Ok(())
+}
+
+/// Numbers in (−½, ½) without pattern, the same each time.
+fn patternless() -> impl FnMut() -> f64 {
+    let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
+    move || {
+        seed ^= seed << 13;
+        seed ^= seed >> 7;
+        seed ^= seed << 17;
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+}
+
+/// Whether the known part is symmetric and, at patternless u, v and X, `uᵀFv = vᵀFu` to rounding: products with vectors only. Where it is
+/// not, the matrices themselves have to be looked at; where it is, an entry differs from its mirror image by less than what they are
+/// held to.
+fn surely_symmetric(expression: &Expr, layout: &Layout, next: &mut impl FnMut() -> f64) -> bool {
+    let n = expression.nrows();
+    let constant = &expression.constant;
+    if (0..n).any(|j| (0..j).any(|i| constant[(i, j)] != constant[(j, i)])) {
+        return false;
+    }
+    let x: Vec<f64> = (0..layout.len()).map(|_| next()).collect();
+    let values = layout.matrices(&x);
+    let [u, v] = [(); 2].map(|()| (0..n).map(|_| next()).collect::<Vec<f64>>());
+    let (mut difference, mut magnitude) = (0.0, 0.0);
+    for term in expression.terms.iter() {
+        let x = &values[term.unknown.index];
+        let (there, back) = match &term.shape {
+            Shape::Product { left, transposed, right } => {
+                let [lu, lv] = [&u, &v].map(|w| row_times(w, left));
+                let [ru, rv] = [&u, &v].map(|w| times_column(right, w));
+                let form = |l: &[f64], r: &[f64]| if *transposed { bilinear(r, x, l) } else { bilinear(l, x, r) };
+                (form(&lu, &rv), form(&lv, &ru))
+            }
+            Shape::Scaled { weights, matrix } => {
+                let factor = crate::expression::inner_product(weights, x);
+                (factor * bilinear(&u, matrix, &v), factor * bilinear(&v, matrix, &u))
+            }
+        };
+        difference += there - back;
+        magnitude += there.abs() + back.abs();
+    }
+    difference.abs() <= PROBED * magnitude
+}
+
+/// Largest block that is probed, and the relative difference that rounding leaves: together they find what exceeds the tolerance on entries.
+const MOST_PROBED: usize = 100;
+const PROBED: f64 = 3e-14;
+
+/// wᵀM.
+fn row_times(w: &[f64], m: &Mat<f64>) -> Vec<f64> {
+    (0..m.ncols()).map(|j| dot(w, m.col_as_slice(j))).collect()
+}
+
+/// M w.
+fn times_column(m: &Mat<f64>, w: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; m.nrows()];
+    w.iter().enumerate().for_each(|(j, w)| axpy(*w, m.col_as_slice(j), &mut out));
+    out
+}
+
+/// aᵀMb.
+fn bilinear(a: &[f64], m: &Mat<f64>, b: &[f64]) -> f64 {
+    b.iter().enumerate().map(|(j, b)| b * dot(a, m.col_as_slice(j))).sum()
 }
 
 fn lower_block(expression: &Expr, layout: &Layout) -> Block {
@@ -309,28 +371,33 @@ impl Product {
             .symmetric
             .then(|| Self { unknown: self.unknown, u: self.v.clone(), v: self.u.clone() }.normalized())
     }
+}
 
-    /// The term written with the given right factor, when it can be.
-    fn with_right_factor(&self, v: &Mat<f64>) -> Option<Self> {
-        if same(&self.v, v) {
-            return Some(self.clone());
-        }
-        self.flipped().filter(|flipped| same(&flipped.v, v))
-    }
+/// A product as it is, and flipped where its unknown is symmetric.
+type Forms = [Option<Product>; 2];
+
+/// The form with the given right factor; the forms back when there is none.
+fn with_right_factor(mut forms: Forms, v: &Mat<f64>) -> Result<Product, Forms> {
+    let fits = forms.iter_mut().find(|form| form.as_ref().is_some_and(|product| same(&product.v, v)));
+    fits.and_then(Option::take).ok_or(forms)
 }
 
 /// Gathers products into stacks, most frequent right factor first.
 fn stack(products: Vec<Product>, layout: &Layout) -> Vec<Stack> {
-    let mut left = merge_left_factors(products);
+    let forms = |product: Product| {
+        let flipped = product.flipped();
+        [Some(product), flipped]
+    };
+    let mut left: Vec<Forms> = merge_left_factors(products).into_iter().map(forms).collect();
     let mut stacks = Vec::new();
     while !left.is_empty() {
         let v = most_frequent_right_factor(&left);
         let mut merged: Vec<Product> = Vec::new();
         let mut rest = Vec::new();
-        for product in left {
-            match product.with_right_factor(&v) {
-                None => rest.push(product),
-                Some(product) => match merged.iter_mut().find(|m| m.unknown == product.unknown) {
+        for forms in left {
+            match with_right_factor(forms, &v) {
+                Err(forms) => rest.push(forms),
+                Ok(product) => match merged.iter_mut().find(|m| m.unknown == product.unknown) {
                     Some(m) => m.u += &product.u,
                     None => merged.push(product),
                 },
@@ -379,14 +446,12 @@ fn merge_left_factors(products: Vec<Product>) -> Vec<Product> {
     merged
 }
 
-fn most_frequent_right_factor(products: &[Product]) -> Mat<f64> {
-    let mut counts: Vec<(Mat<f64>, usize)> = Vec::new();
-    for product in products {
-        for candidate in std::iter::once(product.clone()).chain(product.flipped()) {
-            match counts.iter_mut().find(|(v, _)| same(v, &candidate.v)) {
-                Some((_, count)) => *count += 1,
-                None => counts.push((candidate.v, 1)),
-            }
+fn most_frequent_right_factor(products: &[Forms]) -> Mat<f64> {
+    let mut counts: Vec<(&Mat<f64>, usize)> = Vec::new();
+    for product in products.iter().flatten().flatten() {
+        match counts.iter_mut().find(|(v, _)| same(v, &product.v)) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((&product.v, 1)),
         }
     }
     // The first among equals, so that the outcome does not depend on anything but the expression.
@@ -396,7 +461,7 @@ fn most_frequent_right_factor(products: &[Product]) -> Mat<f64> {
             best = i;
         }
     }
-    counts.swap_remove(best).0
+    counts[best].0.clone()
 }
 
 /// Whether two matrices are equal. Factors of unknowns of different sizes meet in one block, and faer compares matrices of

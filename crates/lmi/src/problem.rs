@@ -5,7 +5,7 @@ use crate::expression::{Expr, Unknown};
 use crate::interior_point::Centre;
 use crate::lowering::{Layout, lower};
 use crate::report::{Original, Translation, report, verify};
-use crate::rigorous::{Enclosure, Gradient};
+use crate::rigorous::{Enclosure, Gradient, SumOfProducts};
 use crate::sdpa::{BlockShape, Coefficient, Sdp};
 use crate::verification::{Spectrum, largest_entry};
 use crate::{Error, Mat, Options, balancing};
@@ -286,6 +286,16 @@ impl Original for Stated<'_> {
 
     fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure {
         Enclosure::of_expression(&self.problem.inequalities[block].expression, &|unknown| &values[unknown.index])
+    }
+
+    fn known_product(&self, block: usize, z: &Mat<f64>) -> SumOfProducts {
+        let constant = &self.problem.inequalities[block].expression.constant;
+        let mut sum = SumOfProducts::default();
+        for j in 0..z.ncols() {
+            let entries = constant.col_as_slice(j).iter().zip(z.col_as_slice(j));
+            entries.filter(|(c, _)| **c != 0.0).for_each(|(c, z)| sum.add(*c, *z));
+        }
+        sum
     }
 
     fn objective(&self, values: &[Mat<f64>]) -> f64 {

@@ -4,7 +4,7 @@ use crate::answer::{Answer, Balancing, BlockReport, InaccurateReason, OptimumBou
 use crate::expression::Unknown;
 use crate::interior_point::{Ending, SOLVED_GAP, Solution};
 use crate::lowering::Layout;
-use crate::rigorous::Enclosure;
+use crate::rigorous::{Enclosure, SumOfProducts};
 use crate::verification::{Spectrum, largest_entry, square};
 use crate::{Mat, Options};
 
@@ -16,6 +16,8 @@ pub(crate) trait Original {
     fn value(&self, block: usize, values: &[Mat<f64>]) -> Mat<f64>;
     /// F_b at the unknowns given, with bounds on its entries.
     fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure;
+    /// ⟨C_b, Z⟩, with a bound on its error.
+    fn known_product(&self, block: usize, z: &Mat<f64>) -> SumOfProducts;
     /// The objective at the unknowns given, in the sense stated.
     fn objective(&self, values: &[Mat<f64>]) -> f64;
     /// Proved upper bounds on `|Σ_b⟨F_{b,i}, Z_b⟩ − offsetᵢ|`, the offset zero if there is none.
@@ -73,8 +75,9 @@ pub(crate) fn report(
     let outcome = match result.ending {
         Ending::Converged if verified => Outcome::Solved,
         Ending::Converged => unverified,
-        Ending::PrimalInfeasible => witness(original, translation.layout, &blocks, &multipliers, &result.units)
-            .map_or(unverified, Outcome::Infeasible),
+        Ending::PrimalInfeasible => {
+            witness(original, &blocks, &multipliers, &result.units).map_or(unverified, Outcome::Infeasible)
+        }
         Ending::DualInfeasible(direction) => {
             ray(original, translation, &blocks, &direction, options).map_or(unverified, Outcome::Unbounded)
         }
@@ -114,9 +117,10 @@ pub(crate) fn verify(original: &dyn Original, values: &[Mat<f64>]) -> (Vec<Block
     let mut blocks = original.blocks();
     let mut verified = true;
     for (index, block) in blocks.iter_mut().enumerate() {
-        let spectrum = spectrum(&original.value(index, values), block.size);
+        let enclosure = original.enclosure(index, values);
+        let spectrum = spectrum(&enclosure.approximate(), block.size);
         block.smallest_eigenvalue = spectrum.smallest;
-        let bound = original.enclosure(index, values).smallest_eigenvalue_bound(&spectrum);
+        let bound = enclosure.smallest_eigenvalue_bound(&spectrum);
         block.verified_lower_bound = bound;
         verified &= match original.floor(index, &spectrum) {
             None => bound > 0.0,
@@ -143,7 +147,7 @@ fn optimum_bound(
     values: &[Mat<f64>],
 ) -> Option<OptimumBound> {
     let definite: Vec<Mat<f64>> = multipliers.iter().map(made_definite).collect::<Option<_>>()?;
-    let at_zero = at_zero(original, translation.layout, blocks, &definite);
+    let at_zero = at_zero(original, blocks, &definite);
     let misses = original.gradient_bounds(&definite, Some(original.costs()));
     let largest: Vec<Mat<f64>> = values
         .iter()
@@ -165,20 +169,14 @@ fn optimum_bound(
 const EXCLUDED: f64 = 1e10;
 
 /// Proves that the multipliers exclude every point within reach, and normalises them.
-fn witness(
-    original: &dyn Original,
-    layout: &Layout,
-    blocks: &[BlockReport],
-    z: &[Mat<f64>],
-    units: &[f64],
-) -> Option<Witness> {
+fn witness(original: &dyn Original, blocks: &[BlockReport], z: &[Mat<f64>], units: &[f64]) -> Option<Witness> {
     let definite: Vec<Mat<f64>> = z.iter().map(made_definite).collect::<Option<_>>()?;
-    let at_zero = at_zero(original, layout, blocks, &definite);
+    let at_zero = at_zero(original, blocks, &definite);
     if at_zero.total.is_nan() || at_zero.total >= 0.0 {
         return None;
     }
     let multipliers: Vec<Mat<f64>> = definite.iter().map(|z| symmetric(&((-1.0 / at_zero.total) * z))).collect();
-    let at_zero = self::at_zero(original, layout, blocks, &multipliers);
+    let at_zero = self::at_zero(original, blocks, &multipliers);
     // Where a default margin decides, F(x) ≻ 0 is excluded only if the known part itself has no share in the matter.
     let needs_margin = at_zero.known > -0.5 * at_zero.total.abs();
     if needs_margin && at_zero.known.abs() > 1e-14 * at_zero.magnitude {
@@ -206,34 +204,25 @@ struct AtZero {
     known: f64,
     /// Σ|terms| of that part.
     magnitude: f64,
-    /// Bound on the rounding error of the total.
+    /// Bound on the rounding errors of both sums.
     error: f64,
 }
 
-fn at_zero(original: &dyn Original, layout: &Layout, blocks: &[BlockReport], z: &[Mat<f64>]) -> AtZero {
-    let zero = layout.matrices(&vec![0.0; layout.len()]);
+fn at_zero(original: &dyn Original, blocks: &[BlockReport], z: &[Mat<f64>]) -> AtZero {
     let mut sum = AtZero { total: 0.0, known: 0.0, magnitude: 0.0, error: 0.0 };
-    let (mut terms, mut magnitude) = (0_usize, 0.0);
     for (index, (block, z)) in blocks.iter().zip(z).enumerate() {
-        let c = original.value(index, &zero);
-        let mut known = 0.0;
-        let mut add = |value: f64| {
-            known += value;
-            sum.magnitude += value.abs();
-            terms += 1;
-        };
-        if c.ncols() == block.size {
-            (0..block.size).for_each(|j| (0..block.size).for_each(|i| add(c[(i, j)] * z[(i, j)])));
-        } else {
-            (0..block.size).for_each(|i| add(c[(i, 0)] * z[(i, i)]));
-        }
-        let margin = (0..block.size).map(|i| block.margin * z[(i, i)]).sum::<f64>();
-        magnitude += margin.abs();
-        terms += block.size;
-        sum.total += known - margin;
-        sum.known += if original.strict(index) { known } else { known - margin };
+        let known = original.known_product(index, z);
+        let mut margin = SumOfProducts::default();
+        (0..block.size).for_each(|i| margin.add(block.margin, z[(i, i)]));
+        sum.magnitude += known.magnitude;
+        sum.error += known.error() + margin.error();
+        let total = known.value() - margin.value();
+        sum.total += total;
+        sum.known += if original.strict(index) { known.value() } else { total };
+        // Every block takes part in two sums of as many terms as there are blocks.
+        let rounded = known.value().abs() + margin.value().abs();
+        sum.error += 2.0 * (blocks.len() + 2) as f64 * f64::EPSILON * rounded;
     }
-    sum.error = (terms + 4) as f64 * f64::EPSILON * (sum.magnitude + magnitude);
     sum
 }
 

@@ -100,12 +100,12 @@ impl Enclosure {
         let largest = crate::verification::largest_entry;
         match shape {
             Shape::Product { left, transposed, right } => {
-                let x = if *transposed { x.transpose().to_owned() } else { x.clone() };
-                let (r, c) = (x.nrows(), x.ncols());
-                let (left, middle, right) = (columns(left), columns(&x), columns(right));
-                let size = |m: &[f64]| m.iter().fold(1.0_f64, |most, e| most.max(e.abs()));
-                self.factor = self.factor.max(size(&left) * size(&middle)).max(size(&middle) * size(&right));
-                self.factor = self.factor.max(size(&right) * size(&left));
+                let (r, c) = if *transposed { (x.ncols(), x.nrows()) } else { (x.nrows(), x.ncols()) };
+                let size = |m: &Mat<f64>| largest(m).max(1.0);
+                let [a, b, d] = [left, x, right].map(size);
+                self.factor = self.factor.max(a * b).max(b * d).max(d * a);
+                let middle = if *transposed { columns(x) } else { rows(x) };
+                let (left, right) = (columns(left), columns(right));
                 triple_product(
                     [n, n],
                     [r, c],
@@ -153,6 +153,12 @@ impl Enclosure {
             }
         }
         self.roundings += 1.0;
+    }
+
+    /// The entries as they were computed, of a diagonal matrix its diagonal as a column.
+    pub fn approximate(&self) -> Mat<f64> {
+        let columns = if self.diagonal { 1 } else { self.n };
+        Mat::from_fn(self.n, columns, |i, j| self.high[i + j * self.n])
     }
 
     /// Upper bounds on the absolute entries, of a diagonal matrix those of its diagonal.
@@ -219,19 +225,28 @@ impl Enclosure {
         let mut high = vec![0.0; n * n];
         let mut low = vec![0.0; n * n];
         let mut errors = vec![0.0; n];
+        let powers = powers(&exponents);
         for j in 0..n {
-            for i in 0..n {
-                let (at, exponent) = (i + j * n, exponents[i] + exponents[j]);
-                (high[at], low[at]) = (scaled(self.high[at], exponent), scaled(self.low[at], exponent));
-                errors[i] += scaled(self.radius(at), exponent) + UNDERFLOW;
-                // A shift that exceeds the diagonal is caught by the factorisation.
-                if i == j {
-                    let shift = scaled(shift, exponent);
-                    let entry = dd::add(Double { h: high[at], l: low[at] }, Double { h: -shift, l: 0.0 });
-                    errors[i] += 2.0 * UNIT * (entry.h.abs() + shift.abs()) + UNDERFLOW;
-                    (high[at], low[at]) = (entry.h, entry.l);
+            let column = j * n..(j + 1) * n;
+            if let Some(powers) = &powers {
+                for ((at, errors), power) in column.zip(&mut errors).zip(powers) {
+                    let factor = power * powers[j];
+                    (high[at], low[at]) = (self.high[at] * factor, self.low[at] * factor);
+                    *errors += self.radius(at) * factor + UNDERFLOW;
+                }
+            } else {
+                for (i, at) in column.enumerate() {
+                    let exponent = exponents[i] + exponents[j];
+                    (high[at], low[at]) = (scaled(self.high[at], exponent), scaled(self.low[at], exponent));
+                    errors[i] += scaled(self.radius(at), exponent) + UNDERFLOW;
                 }
             }
+            // A shift that exceeds the diagonal is caught by the factorisation.
+            let at = j + j * n;
+            let shift = scaled(shift, 2 * exponents[j]);
+            let entry = dd::add(Double { h: high[at], l: low[at] }, Double { h: -shift, l: 0.0 });
+            errors[j] += 2.0 * UNIT * (entry.h.abs() + shift.abs()) + UNDERFLOW;
+            (high[at], low[at]) = (entry.h, entry.l);
         }
         let largest = (0..n).map(|i| high[i + i * n]).fold(1.0, f64::max);
         let gamma = (n + 1) as f64 * UNIT;
@@ -247,6 +262,39 @@ impl Enclosure {
             (high[at], low[at]) = (entry.h, entry.l);
         }
         factorizes(n, &mut high, &mut low)
+    }
+}
+
+/// A sum of products of two numbers, with a bound on its error.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SumOfProducts {
+    sum: Double,
+    /// Σ|terms|.
+    pub magnitude: f64,
+    terms: usize,
+    factor: f64,
+}
+
+impl SumOfProducts {
+    /// Adds a·b.
+    pub fn add(&mut self, a: f64, b: f64) {
+        let term = dd::two_product(a, b);
+        self.sum = dd::add(self.sum, term);
+        self.magnitude += term.h.abs();
+        self.terms += 1;
+        self.factor = self.factor.max(a.abs()).max(b.abs());
+    }
+
+    /// The sum, rounded.
+    pub fn value(&self) -> f64 {
+        self.sum.h
+    }
+
+    /// Bound on the error of the rounded sum.
+    pub fn error(&self) -> f64 {
+        let roundings = (self.terms + 4) as f64;
+        let tail = 2.0 * roundings * UNIT * self.magnitude + UNDERFLOW * self.factor.max(1.0) * roundings;
+        1.001 * (self.sum.l.abs() + tail)
     }
 }
 
@@ -273,14 +321,15 @@ impl Gradient {
                 match &term.shape {
                     Shape::Product { left, transposed, right } => {
                         // ⟨Z, U X V⟩ = ⟨Uᵀ Z Vᵀ, X⟩ and ⟨Z, U Xᵀ V⟩ = ⟨V Z U, X⟩.
-                        let (u, v) = if *transposed {
-                            (right.clone(), left.clone())
+                        let (outer, u, v) = if *transposed {
+                            ([right.nrows(), left.ncols()], columns(right), columns(left))
                         } else {
-                            (left.transpose().to_owned(), right.transpose().to_owned())
+                            ([left.ncols(), right.nrows()], rows(left), rows(right))
                         };
-                        factor = factor.max(size(&u) * size(&v)).max(size(z) * size(&v)).max(size(z) * size(&u));
-                        let outer = [u.nrows(), v.ncols()];
-                        triple_product(outer, [n, n], [&columns(&u), &columns(z), &columns(&v)], sums);
+                        let [a, b, c] = [left, z, right].map(size);
+                        factor = factor.max(a * c).max(b * c).max(a * b);
+                        // Of a symmetric Z rows are columns.
+                        triple_product(outer, [n, n], [&u, &columns(z), &v], sums);
                         roundings += (2 * n + 4) as f64;
                     }
                     Shape::Scaled { weights, matrix } => {
@@ -322,7 +371,19 @@ impl Gradient {
 
 /// The entries column by column.
 fn columns(m: &Mat<f64>) -> Vec<f64> {
-    (0..m.ncols()).flat_map(|j| (0..m.nrows()).map(move |i| (i, j))).map(|(i, j)| m[(i, j)]).collect()
+    let mut out = Vec::with_capacity(m.nrows() * m.ncols());
+    (0..m.ncols()).for_each(|j| out.extend_from_slice(m.col_as_slice(j)));
+    out
+}
+
+/// The entries row by row.
+fn rows(m: &Mat<f64>) -> Vec<f64> {
+    (0..m.nrows()).flat_map(|i| (0..m.ncols()).map(move |j| m[(i, j)])).collect()
+}
+
+/// Powers of two that two at a time are multiplied without over- or underflow; `None` where an exponent is too large for that.
+fn powers(exponents: &[i32]) -> Option<Vec<f64>> {
+    exponents.iter().map(|&e| (e.abs() <= 500).then(|| 2.0_f64.powi(e))).collect()
 }
 
 /// value · 2^exponent, without losing bits on the way when the result is a normal number.
@@ -332,33 +393,31 @@ fn scaled(value: f64, exponent: i32) -> f64 {
 }
 
 vectorized! {
-    /// sum ← sum + L X R for n × r, r × c and c × m matrices, and the same of absolute values.
+    /// sum ← sum + L X R for n × r, r × c and c × m matrices, X row by row, and the same of absolute values. L and R mostly select and
+    /// place, so that zeros of theirs are passed over.
     fn triple_product<'a>(outer: [usize; 2], inner: [usize; 2], factors: [&'a [f64]; 3], sums: [&'a mut [f64]; 3]) {
         let ([n, m], [r, c]) = (outer, inner);
         let [left, x, right] = factors;
         let [high, low, magnitude] = sums;
-        let mut t_high = vec![0.0; n * c];
-        let mut t_low = vec![0.0; n * c];
-        let mut t_magnitude = vec![0.0; n * c];
-        for l in 0..c {
-            let (th, tl, tm) = (&mut t_high[l * n..(l + 1) * n], &mut t_low[l * n..(l + 1) * n], &mut t_magnitude[l * n..(l + 1) * n]);
-            for k in 0..r {
-                let factor = x[k + l * r];
-                if factor == 0.0 {
-                    continue;
-                }
-                let column = &left[k * n..(k + 1) * n];
-                for i in 0..n {
-                    if column[i] == 0.0 {
-                        continue;
-                    }
-                    let term = dd::two_product(column[i], factor);
-                    let sum = dd::add(Double { h: th[i], l: tl[i] }, term);
-                    (th[i], tl[i]) = (sum.h, sum.l);
-                    tm[i] += term.h.abs();
+        // L X row by row, then column by column.
+        let mut rows = vec![0.0; 3 * n * c];
+        let (rows_high, rest) = rows.split_at_mut(n * c);
+        let (rows_low, rows_magnitude) = rest.split_at_mut(n * c);
+        for k in 0..r {
+            let x = &x[k * c..(k + 1) * c];
+            for (i, &factor) in left[k * n..(k + 1) * n].iter().enumerate().filter(|(_, factor)| **factor != 0.0) {
+                let row = i * c..(i + 1) * c;
+                let (th, tl, tm) = (&mut rows_high[row.clone()], &mut rows_low[row.clone()], &mut rows_magnitude[row]);
+                for l in 0..c {
+                    let term = dd::two_product(x[l], factor);
+                    let sum = dd::add(Double { h: th[l], l: tl[l] }, term);
+                    (th[l], tl[l]) = (sum.h, sum.l);
+                    tm[l] += term.h.abs();
                 }
             }
         }
+        let column_by_column = |rows: &[f64]| -> Vec<f64> { (0..n * c).map(|at| rows[at % n * c + at / n]).collect() };
+        let [t_high, t_low, t_magnitude] = [&*rows_high, &*rows_low, &*rows_magnitude].map(column_by_column);
         for j in 0..m {
             let (fh, fl, fm) = (&mut high[j * n..(j + 1) * n], &mut low[j * n..(j + 1) * n], &mut magnitude[j * n..(j + 1) * n]);
             for l in 0..c {

@@ -31,7 +31,7 @@ use crate::expression::Unknown;
 use crate::factored::Factored;
 use crate::lowering::{Layout, check_size};
 use crate::report::{Original, Translation, report, verify};
-use crate::rigorous::Enclosure;
+use crate::rigorous::{Enclosure, SumOfProducts};
 use crate::sparse::{Entry, Sparse, merge};
 use crate::verification::Spectrum;
 use crate::{Error, Explanation, Mat, Options, balancing, structure};
@@ -305,6 +305,17 @@ impl Original for Stated<'_> {
         }
         // Every entry has at most one term of each matrix unless entries are repeated.
         sum.count(terms);
+        sum
+    }
+
+    fn known_product(&self, block: usize, z: &Mat<f64>) -> SumOfProducts {
+        let mut sum = SumOfProducts::default();
+        for c in self.sdp.coefficients.iter().filter(|c| c.block == block && c.unknown.is_none()) {
+            sum.add(-c.value, z[(c.row, c.column)]);
+            if c.row != c.column {
+                sum.add(-c.value, z[(c.column, c.row)]);
+            }
+        }
         sum
     }
 

@@ -70,15 +70,27 @@ pub(crate) fn square(block: &[f64], n: usize) -> Mat<f64> {
 
 /// The largest absolute entry; NaN if there is one.
 pub(crate) fn largest_entry(m: &Mat<f64>) -> f64 {
-    let mut largest = 0.0_f64;
-    for j in 0..m.ncols() {
-        for i in 0..m.nrows() {
-            let entry = m[(i, j)].abs();
-            if entry.is_nan() {
-                return f64::NAN;
-            }
-            largest = largest.max(entry);
+    (0..m.ncols())
+        .map(|j| largest(m.col_as_slice(j)))
+        .fold(0.0, |most, entry| if entry > most || entry.is_nan() { entry } else { most })
+}
+
+/// The largest absolute value; NaN if there is one.
+pub(crate) fn largest(values: &[f64]) -> f64 {
+    // Eight running maxima, and a sum that is NaN when an entry is: both go without branches.
+    let (mut most, mut sum) = ([0.0_f64; 8], [0.0_f64; 8]);
+    let chunks = values.chunks_exact(8);
+    let rest =
+        chunks.remainder().iter().fold(0.0_f64, |most, v| if v.abs() > most || v.is_nan() { v.abs() } else { most });
+    for chunk in chunks {
+        for k in 0..8 {
+            let value = chunk[k].abs();
+            most[k] = if value > most[k] { value } else { most[k] };
+            sum[k] += value;
         }
     }
-    largest
+    if rest.is_nan() || sum.iter().any(|s| s.is_nan()) {
+        return f64::NAN;
+    }
+    most.iter().fold(rest, |a, b| a.max(*b))
 }
