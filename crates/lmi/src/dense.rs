@@ -13,6 +13,7 @@ const SMALL: usize = small::MOST;
 /// Scratch memory for the factorisations.
 pub(crate) struct Scratch {
     buffer: MemBuffer,
+    /// Of matrices up to [`SMALL`] rows.
     padded: Vec<f64>,
 }
 
@@ -21,7 +22,7 @@ impl Scratch {
     pub fn new(n: usize) -> Self {
         let factor = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
         let inverse = llt::inverse::inverse_scratch::<f64>(n, Par::Seq);
-        Self { buffer: MemBuffer::new(factor.or(inverse)), padded: small::scratch() }
+        Self { buffer: MemBuffer::new(factor.or(inverse)), padded: small::scratch(n) }
     }
 }
 

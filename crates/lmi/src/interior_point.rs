@@ -444,7 +444,8 @@ impl<'a> Iteration<'a> {
         }
         scale_by(self.scale, &mut self.right_side);
         crate::dense::axpy(-1.0, self.objective, &mut self.right_side);
-        self.schur.solve(&self.right_side, &mut self.dx);
+        // What this leaves is refined against the equations themselves.
+        self.schur.solve_once(&self.right_side, &mut self.dx);
         product(self.scale, &self.dx, &mut self.unscaled);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.complete(block, &self.unscaled, self.feasible, &mut self.scratch);

@@ -108,6 +108,13 @@ impl Schur {
         }
     }
 
+    /// Solves M x = r by the factor alone.
+    pub fn solve_once(&mut self, r: &[f64], x: &mut [f64]) {
+        self.correction.copy_from_slice(r);
+        self.solve_factored();
+        x.copy_from_slice(&self.correction);
+    }
+
     fn solve_factored(&mut self) {
         let n = self.n;
         self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
