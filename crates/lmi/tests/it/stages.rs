@@ -116,6 +116,17 @@ fn points_of_others_are_verified() {
     assert!(matches!(problem.verify(&[Mat::zeros(3, 3)]), Err(Error::BadPoint { .. })));
 }
 
+/// Points a little outside get a bound a little below, also where the terms of F cancel so far that `f64` would not see the eigenvalue.
+#[test]
+fn slightly_infeasible_points_are_bounded_sharply() {
+    // 10⁸(x₁ + x₂)·I with the known part −10⁻¹⁰·I, on a 2 × 2 block; F₀ is stated in parts that cancel.
+    let text = "2\n1\n2\n0 0\n0 1 1 1 1e8\n0 1 1 1 -1e8\n0 1 1 1 1e-10\n0 1 2 2 1e-10\n\
+                1 1 1 1 1e8\n1 1 2 2 1e8\n2 1 1 1 1e8\n2 1 2 2 1e8\n";
+    let sdp = sdpa::read(text.as_bytes()).unwrap();
+    let bound = sdp.verify(&[0.3, -0.3]).unwrap()[0].verified_lower_bound;
+    assert!(bound <= -1e-10 && bound > -1.01e-10, "{bound:e}");
+}
+
 /// Expressions and the file written from them have one optimum, and the file is what other solvers' makers wrote by hand.
 #[test]
 fn a_problem_written_as_a_file_is_the_same() {
