@@ -376,10 +376,10 @@ impl Product {
 /// A product as it is, and flipped where its unknown is symmetric.
 type Forms = [Option<Product>; 2];
 
-/// The form with the given right factor; the forms back when there is none.
-fn with_right_factor(mut forms: Forms, v: &Mat<f64>) -> Result<Product, Forms> {
+/// The form with the given right factor, taken out.
+fn with_right_factor(forms: &mut Forms, v: &Mat<f64>) -> Option<Product> {
     let fits = forms.iter_mut().find(|form| form.as_ref().is_some_and(|product| same(&product.v, v)));
-    fits.and_then(Option::take).ok_or(forms)
+    fits.and_then(Option::take)
 }
 
 /// Gathers products into stacks, most frequent right factor first.
@@ -394,10 +394,10 @@ fn stack(products: Vec<Product>, layout: &Layout) -> Vec<Stack> {
         let v = most_frequent_right_factor(&left);
         let mut merged: Vec<Product> = Vec::new();
         let mut rest = Vec::new();
-        for forms in left {
-            match with_right_factor(forms, &v) {
-                Err(forms) => rest.push(forms),
-                Ok(product) => match merged.iter_mut().find(|m| m.unknown == product.unknown) {
+        for mut forms in left {
+            match with_right_factor(&mut forms, &v) {
+                None => rest.push(forms),
+                Some(product) => match merged.iter_mut().find(|m| m.unknown == product.unknown) {
                     Some(m) => m.u += &product.u,
                     None => merged.push(product),
                 },

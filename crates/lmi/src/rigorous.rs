@@ -207,7 +207,11 @@ impl Enclosure {
             }
             return shift(holds);
         }
-        let below = [1.0, 2.0, 8.0].map(|factor| smallest.min(0.0) - factor * rounding.max(LEAST_ROUNDING));
+        // What is not known of the entries may exceed what rounding did to the eigenvalue.
+        let row = |i: usize| (0..self.n).map(|j| self.radius(i + j * self.n)).sum::<f64>();
+        let unknown = (0..self.n).map(row).fold(0.0, f64::max);
+        let step = rounding.max(2.0 * unknown).max(LEAST_ROUNDING);
+        let below = [1.0, 2.0, 8.0].map(|factor| smallest.min(0.0) - factor * step);
         below.into_iter().find(|&shift| self.exceeds(shift)).unwrap_or(f64::NEG_INFINITY)
     }
 
