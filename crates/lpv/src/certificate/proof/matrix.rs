@@ -1,5 +1,6 @@
 //! Matrices of Taylor forms, and the proof that a symmetric one is positive definite over a cell.
 
+use super::enclosed::Enclosed;
 use crate::math::Mat;
 use crate::math::eigen::{smallest_eigenvalue, smallest_eigenvector};
 use crate::math::interval::Interval;
@@ -92,13 +93,13 @@ impl TaylorMatrix {
     }
 }
 
-/// M(t) ∈ value + (t − c) slope + ½(t − c)² bend on a cell, symmetric, n × n in row order.
+/// M(t) ∈ value + (t − c) slope + ½(t − c)² bend on a cell, symmetric, n × n.
 #[derive(Clone, Debug)]
 pub(super) struct CellMatrix {
     n: usize,
-    value: Vec<Interval>,
-    slope: Vec<Interval>,
-    bend: Vec<Interval>,
+    value: Enclosed,
+    slope: Enclosed,
+    bend: Enclosed,
 }
 
 /// What is known of a symmetric matrix on a cell.
@@ -124,11 +125,8 @@ impl CellMatrix {
     /// From the Taylor forms at the middle and over the cell; the symmetric part is taken.
     pub fn new(middle: &TaylorMatrix, over: &TaylorMatrix) -> Self {
         let n = middle.rows;
-        let half = |x: Interval| x * 0.5;
-        let entry = |at: usize| (at / n, at % n);
-        let symmetric = |of: &dyn Fn(usize, usize) -> Interval| -> Vec<Interval> {
-            (0..n * n).map(entry).map(|(i, j)| half(of(i, j) + of(j, i))).collect()
-        };
+        let symmetric =
+            |of: &dyn Fn(usize, usize) -> Interval| Enclosed::new(n, |i, j| (of(i, j) + of(j, i)) * 0.5);
         Self {
             n,
             value: symmetric(&|i, j| middle.at(i, j).value),
@@ -140,24 +138,21 @@ impl CellMatrix {
     /// Σ wₖMₖ.
     pub fn combination(terms: &[(f64, &CellMatrix)]) -> Self {
         let n = terms[0].1.n;
-        let sum = |of: &dyn Fn(&CellMatrix) -> &Vec<Interval>| -> Vec<Interval> {
-            let at = |at: usize| {
-                (terms.iter()).filter(|(w, _)| *w != 0.0).fold(Interval::point(0.0), |sum, (w, m)| sum + of(m)[at] * *w)
-            };
-            (0..n * n).map(at).collect()
+        let sum = |of: fn(&CellMatrix) -> &Enclosed| {
+            Enclosed::combination(n, terms.iter().map(move |(weight, matrix)| (*weight, of(matrix))))
         };
-        Self { n, value: sum(&|m| &m.value), slope: sum(&|m| &m.slope), bend: sum(&|m| &m.bend) }
+        Self { n, value: sum(|m| &m.value), slope: sum(|m| &m.slope), bend: sum(|m| &m.bend) }
     }
 
     /// The value in the middle, as numbers.
     pub fn middle(&self) -> Mat<f64> {
-        Mat::from_fn(self.n, self.n, |i, j| self.value[i * self.n + j].middle())
+        self.value.middle()
     }
 
     /// Nothing is known.
     pub fn unbounded(n: usize) -> Self {
-        let entire = vec![Interval::ENTIRE; n * n];
-        Self { n, value: entire.clone(), slope: entire.clone(), bend: entire }
+        let nothing = Enclosed::unbounded(n);
+        Self { n, value: nothing.clone(), slope: nothing.clone(), bend: nothing }
     }
 
     /// Is −M, or M, positive definite for all |t − c| ≤ `half`?
@@ -169,23 +164,13 @@ impl CellMatrix {
         let middle = self.middle();
         let Some(inverse) = cholesky_inverse(&middle) else { return self.refutation(&middle) };
         // Tᵀ = L⁻¹, row order
-        let factor = |i: usize, j: usize| inverse[(i, j)];
-        let value = congruence(n, &factor, &self.value);
-        let slope = congruence(n, &factor, &self.slope);
-        let bend = congruence(n, &factor, &self.bend);
+        let factor: Vec<f64> = (0..n * n).map(|at| inverse[(at / n, at % n)]).collect();
         let half = Interval::point(half);
-        let sums = |i: usize| {
-            (0..n).fold([Interval::point(0.0); 3], |[constant, linear, quadratic], j| {
-                let at = i * n + j;
-                let identity = if i == j { 1.0 } else { 0.0 };
-                [
-                    constant + Interval::point((value[at] - identity).magnitude()),
-                    linear + Interval::point(slope[at].magnitude()),
-                    quadratic + Interval::point(bend[at].magnitude()) * 0.5,
-                ]
-            })
-        };
-        let sums: Vec<[Interval; 3]> = (0..n).map(sums).collect();
+        let [constant, linear, quadratic] = [(&self.value, 1.0), (&self.slope, 0.0), (&self.bend, 0.0)]
+            .map(|(matrix, identity)| matrix.row_sums_of_congruence(&factor, identity));
+        let point = Interval::point;
+        let sums: Vec<[Interval; 3]> =
+            (0..n).map(|i| [point(constant[i]), point(linear[i]), point(quadratic[i]) * 0.5]).collect();
         let excess = |[constant, linear, quadratic]: &[Interval; 3]| {
             (*constant + half * *linear + half.square() * *quadratic).hi()
         };
@@ -209,33 +194,11 @@ impl CellMatrix {
             return Definiteness::Open { fits: 0.0 };
         };
         let form = (0..n * n).fold(Interval::point(0.0), |sum, at| {
-            sum + self.value[at] * (Interval::point(direction[at / n]) * direction[at % n])
+            sum + self.value.at(at / n, at % n) * (Interval::point(direction[at / n]) * direction[at % n])
         });
         match form.hi() < 0.0 {
             true => Definiteness::Refuted { direction, value: form.hi() },
             false => Definiteness::Open { fits: 0.0 },
         }
     }
-}
-
-/// F M Fᵀ for a lower triangular F of numbers.
-fn congruence(n: usize, factor: &dyn Fn(usize, usize) -> f64, matrix: &[Interval]) -> Vec<Interval> {
-    let mut left = vec![Interval::point(0.0); n * n];
-    for i in 0..n {
-        for k in 0..=i {
-            let f = Interval::point(factor(i, k));
-            for j in 0..n {
-                left[i * n + j] = left[i * n + j] + f * matrix[k * n + j];
-            }
-        }
-    }
-    let mut both = vec![Interval::point(0.0); n * n];
-    for i in 0..n {
-        for j in 0..n {
-            for k in 0..=j {
-                both[i * n + j] = both[i * n + j] + left[i * n + k] * factor(j, k);
-            }
-        }
-    }
-    both
 }
