@@ -91,6 +91,41 @@ impl Interval {
         Self { lo: square.lo.max(0.0), hi: square.hi }
     }
 
+    /// Σ wₖxₖ for vectors wₖ of `len` numbers, with one bound on the rounding of all of it.
+    ///
+    /// Each of N products and sums is wrong by at most 2⁻⁵³ of what it adds up to and 2⁻¹⁰⁷⁵, so that an end is at most
+    /// (N + 1)2⁻⁵³ Σ|wₖxₖ| + N 2⁻¹⁰⁷⁵ from the exact one; it is moved outwards by twice that and more. A sum without a term that is not
+    /// zero is exactly zero.
+    pub fn weighted_sums<'a>(len: usize, terms: impl Iterator<Item = (&'a [f64], Self)>) -> Vec<Self> {
+        let (mut lo, mut hi) = (vec![0.0; len], vec![0.0; len]);
+        let (mut magnitude, mut weight, mut count) = (vec![0.0; len], vec![0.0; len], 2.0);
+        for (weights, x) in terms.filter(|(_, x)| !x.is_zero()) {
+            count += 1.0;
+            if !x.magnitude().is_finite() {
+                // 0 · ∞ is no number
+                weights.iter().zip(&mut magnitude).filter(|(w, _)| **w != 0.0).for_each(|(_, m)| *m = f64::INFINITY);
+                continue;
+            }
+            for (at, &w) in weights.iter().enumerate() {
+                let (a, b) = (w * x.lo, w * x.hi);
+                let (least, most) = if a < b { (a, b) } else { (b, a) };
+                lo[at] += least;
+                hi[at] += most;
+                magnitude[at] += if -least > most { -least } else { most };
+                weight[at] += w.abs();
+            }
+        }
+        let sum = |at: usize| {
+            if weight[at] == 0.0 && magnitude[at] == 0.0 {
+                return Self::point(0.0);
+            }
+            let widening = count * (magnitude[at] * f64::EPSILON + f64::MIN_POSITIVE);
+            let sum = Self { lo: lo[at] - widening, hi: hi[at] + widening };
+            if (sum.hi - sum.lo).is_finite() { sum } else { Self::ENTIRE }
+        };
+        (0..len).map(sum).collect()
+    }
+
     /// The ends moved outwards by more than the rounding of one operation; the whole line where one is not finite.
     ///
     /// The exact result x of an operation that gave r has |x − r| ≤ 2⁻⁵³|r| + 2⁻¹⁰⁷⁵. Adding d = 2⁻⁵¹|r| + 2⁻¹⁰²² outwards, the sum
@@ -311,6 +346,42 @@ mod tests {
             prop_assert!((sin.square() + cos.square()).contains(1.0));
             prop_assert!(sin.hi - sin.lo < 1e-13 && cos.hi - cos.lo < 1e-13);
         }
+    }
+
+    proptest! {
+        /// Integers are exact: the sum of members with integer ends lies inside, and about as sharply as operation by operation.
+        #[test]
+        fn weighted_sums_hold_their_members(terms in prop::collection::vec((-1000_i32..1000, -1000_i32..1000, 0_i32..50, 0.0_f64..1.0), 0..12)) {
+            let scale = 1.0 / 3.0;
+            let of = |x: i32| f64::from(x) * scale;
+            let parts = terms.iter().map(|&(w, x, width, _)| (of(w), Interval::new(of(x), of(x + width))));
+            let weights: Vec<[f64; 3]> = terms.iter().map(|&(w, ..)| [of(w), 0.0, -of(w)]).collect();
+            let sums = Interval::weighted_sums(3, weights.iter().map(|w| &w[..]).zip(parts.clone().map(|(_, x)| x)));
+            let sum = sums[0];
+            prop_assert_eq!((sums[1], sums[2]), (Interval::point(0.0), -sum));
+            // w x of numbers that are the doubles nearest to thirds: exactly, in units of the last place of the smallest, by i128
+            let units = |x: f64| (x * 2.0_f64.powi(54)) as i128;
+            let [low, high] = [true, false].map(|low| {
+                let ends = terms.iter().map(|&(w, x, width, _)| {
+                    let ends = [units(of(w)) * units(of(x)), units(of(w)) * units(of(x + width))];
+                    if low { ends[0].min(ends[1]) } else { ends[0].max(ends[1]) }
+                });
+                ends.sum::<i128>()
+            });
+            let end = |x: f64| x * 2.0_f64.powi(108);
+            prop_assert!(end(sum.lo) <= low as f64 && high as f64 <= end(sum.hi));
+            let singly = parts.fold(Interval::point(0.0), |sum, (w, x)| sum + x * w);
+            prop_assert!(sum.hi - sum.lo <= (singly.hi - singly.lo) * 1.1 + 1e-9);
+        }
+    }
+
+    #[test]
+    fn sums_with_infinite_terms_are_the_whole_line() {
+        let terms = [(&[1.0, 1.0][..], Interval::point(1.0)), (&[2.0, 0.0][..], Interval::ENTIRE)];
+        let [first, second] = Interval::weighted_sums(2, terms.into_iter())[..] else { unreachable!() };
+        assert_eq!(first, Interval::ENTIRE);
+        assert!(second.contains(1.0) && second.hi - second.lo < 1e-14);
+        assert_eq!(Interval::weighted_sums(1, std::iter::empty()), vec![Interval::point(0.0)]);
     }
 
     #[test]

@@ -98,6 +98,28 @@ impl MatrixFunction {
         (self.coefficients[0].nrows(), self.coefficients[0].ncols())
     }
 
+    /// f₁(ρ), f₂(ρ), …; sine and cosine of a harmonic that stand side by side are computed together.
+    ///
+    /// # Panics
+    /// If a function's parameter is not in `rho`.
+    pub fn factors<S: Scalar + Copy>(&self, rho: &[S]) -> Vec<S> {
+        let mut last: Option<((usize, u32), (S, S))> = None;
+        let mut sin_cos = |parameter: usize, harmonic: u32| match last {
+            Some((known, values)) if known == (parameter, harmonic) => values,
+            _ => {
+                let values = (rho[parameter] * f64::from(harmonic)).sin_cos();
+                last = Some(((parameter, harmonic), values));
+                values
+            }
+        };
+        let mut factor = |function: &BasisFunction| match *function {
+            BasisFunction::Sin { parameter, harmonic } => sin_cos(parameter, harmonic).0,
+            BasisFunction::Cos { parameter, harmonic } => sin_cos(parameter, harmonic).1,
+            _ => function.at(rho),
+        };
+        self.basis.iter().map(&mut factor).collect()
+    }
+
     /// M(ρ).
     pub fn at(&self, rho: &[f64]) -> Mat<f64> {
         self.combine(|function| function.at(rho))

@@ -5,7 +5,7 @@ use crate::controller::{InputLimits, Schedule};
 use crate::math::Mat;
 use crate::math::interval::Interval;
 use crate::math::matrix::{inverse_spd, quadratic_form};
-use crate::math::taylor::{Taylor, TaylorDual};
+use crate::math::taylor::Taylor;
 use crate::model::MatrixFunction;
 use crate::plant::{Description, Plant};
 use crate::synthesis::{CostWeights, Design};
@@ -176,18 +176,6 @@ impl<'a> ClosedLoop<'a> {
         t * Taylor::constant(self.step) + self.low
     }
 
-    fn function(&self, function: &MatrixFunction, rho: Taylor) -> TaylorMatrix {
-        let factors: Vec<Taylor> = function.basis.iter().map(|basis| basis.at(&[rho])).collect();
-        combine(function, &factors)
-    }
-
-    /// ∂/∂ρ, by dual numbers.
-    fn derivative(&self, function: &MatrixFunction, rho: Taylor) -> TaylorMatrix {
-        let rho = TaylorDual::new(rho, true);
-        let factors: Vec<Taylor> = function.basis.iter().map(|basis| basis.at(&[rho]).derivative).collect();
-        combine(function, &factors)
-    }
-
     /// The gain that flies at position `t`, as numbers.
     pub fn gain(&self, t: f64) -> Mat<f64> {
         self.schedule.gain_matrix(self.parameter(t))
@@ -213,10 +201,10 @@ impl<'a> ClosedLoop<'a> {
             None => k,
             Some(f) => TaylorMatrix::from_fn(m, n, |i, j| if mixture >> i & 1 == 1 { k.at(i, j) } else { f.at(i, j) }),
         };
-        let auxiliary = self.auxiliary.as_ref().map(|f| self.function(f, rho));
+        let auxiliary = self.auxiliary.as_ref().map(|f| TaylorMatrix::of_function(f, rho));
         match &self.form {
             Form::Direct(p) => {
-                let (p_rate, p) = (self.derivative(p, rho), self.function(p, rho));
+                let [p, p_rate] = TaylorMatrix::of_function_and_derivative(p, rho);
                 let s = mixed(k, auxiliary);
                 let flow = p.times(&b.times(&s).minus(&a));
                 Parts {
@@ -228,7 +216,7 @@ impl<'a> ClosedLoop<'a> {
                 }
             }
             Form::Inverse(y) => {
-                let (y_rate, y) = (self.derivative(y, rho), self.function(y, rho));
+                let [y, y_rate] = TaylorMatrix::of_function_and_derivative(y, rho);
                 let sy = mixed(k.times(&y), auxiliary);
                 let flow = b.times(&sy).minus(&a.times(&y));
                 let cost = sy.quadratic(r).plus(&y.quadratic(q)).negated();
@@ -263,14 +251,14 @@ impl<'a> ClosedLoop<'a> {
         let rho = self.rho(t);
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let (Form::Direct(function) | Form::Inverse(function)) = &self.form;
-        let matrix = self.function(function, rho);
+        let matrix = TaylorMatrix::of_function(function, rho);
         let Some((row, bound)) = border else { return matrix };
         let row: Vec<Taylor> = match row {
             Row::Input(i) => {
                 // that row alone
                 let row = |gain: &TaylorMatrix| TaylorMatrix::from_fn(1, n, |_, j| gain.at(i, j));
                 let gain = match &self.auxiliary {
-                    Some(auxiliary) => row(&self.function(auxiliary, rho)),
+                    Some(auxiliary) => row(&TaylorMatrix::of_function(auxiliary, rho)),
                     None => {
                         let k = row(&TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho)));
                         match self.form {
@@ -356,13 +344,4 @@ impl Form {
             Form::Inverse(y) => inverse_spd(&y.at(&[rho])),
         }
     }
-}
-
-/// Σ fₖMₖ with the values of the basis functions.
-pub(super) fn combine(function: &MatrixFunction, factors: &[Taylor]) -> TaylorMatrix {
-    let (rows, columns) = function.shape();
-    TaylorMatrix::from_fn(rows, columns, |i, j| {
-        let terms = factors.iter().zip(&function.coefficients).filter(|(_, m)| m[(i, j)] != 0.0);
-        terms.fold(Taylor::from(0.0), |sum, (&factor, m)| sum + factor * m[(i, j)])
-    })
 }

@@ -1,11 +1,11 @@
 //! The bounded-real inequality over the whole range of its parameter, between grid points too.
 
-use super::closed_loop::{Place, combine};
+use super::closed_loop::Place;
 use super::matrix::{CellMatrix, TaylorMatrix};
 use super::{Attempt, Cells, LEAST_HALF};
 use crate::certificate::{Claim, Verdict, Witness};
 use crate::math::interval::Interval;
-use crate::math::taylor::{Taylor, TaylorDual};
+use crate::math::taylor::Taylor;
 use crate::model::MatrixFunction;
 use crate::synthesis::bounded_real::{GainBound, InputOutputModel};
 use std::time::Instant;
@@ -89,16 +89,9 @@ pub fn prove_gain(model: &InputOutputModel, bound: &GainBound) -> Claim {
 
 /// The constant part, what ρ̇ multiplies, what γ multiplies, and P.
 fn parts(model: &InputOutputModel, p: &MatrixFunction, rho: Taylor) -> [TaylorMatrix; 4] {
-    let function = |function: &MatrixFunction| {
-        let factors: Vec<Taylor> = function.basis.iter().map(|basis| basis.at(&[rho])).collect();
-        combine(function, &factors)
-    };
-    let [a, b, c, d, value] = [&model.a, &model.b, &model.c, &model.d, p].map(function);
-    let slope = {
-        let rho = TaylorDual::new(rho, true);
-        let factors: Vec<Taylor> = p.basis.iter().map(|basis| basis.at(&[rho]).derivative).collect();
-        combine(p, &factors)
-    };
+    let [a, b, c, d] =
+        [&model.a, &model.b, &model.c, &model.d].map(|function| TaylorMatrix::of_function(function, rho));
+    let [value, slope] = TaylorMatrix::of_function_and_derivative(p, rho);
     let ((n, m), outputs) = (model.b.shape(), model.c.shape().0);
     let flow = value.times(&a);
     let (flow, pb) = (flow.plus(&flow.transpose()), value.times(&b));

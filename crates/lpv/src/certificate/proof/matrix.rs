@@ -5,7 +5,8 @@ use crate::math::Mat;
 use crate::math::eigen::{smallest_eigenvalue, smallest_eigenvector};
 use crate::math::interval::Interval;
 use crate::math::matrix::cholesky_inverse;
-use crate::math::taylor::Taylor;
+use crate::math::taylor::{Taylor, TaylorDual};
+use crate::model::MatrixFunction;
 
 /// A matrix of functions of the cell's variable, in row order.
 #[derive(Clone, Debug)]
@@ -27,6 +28,38 @@ impl TaylorMatrix {
 
     pub fn from_fn(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> Taylor) -> Self {
         Self { rows, columns, entries: (0..rows * columns).map(|at| entry(at / columns, at % columns)).collect() }
+    }
+
+    /// M(ρ).
+    pub fn of_function(function: &MatrixFunction, rho: Taylor) -> Self {
+        Self::combination(function, &function.factors(&[rho]))
+    }
+
+    /// M(ρ) and ∂M/∂ρ, by dual numbers.
+    pub fn of_function_and_derivative(function: &MatrixFunction, rho: Taylor) -> [Self; 2] {
+        let factors = function.factors(&[TaylorDual::new(rho, true)]);
+        let of = |part: fn(&TaylorDual) -> Taylor| {
+            Self::combination(function, &factors.iter().map(part).collect::<Vec<Taylor>>())
+        };
+        [of(|factor| factor.value), of(|factor| factor.derivative)]
+    }
+
+    /// Σ fₖMₖ.
+    fn combination(function: &MatrixFunction, factors: &[Taylor]) -> Self {
+        let (rows, columns) = function.shape();
+        let has_bend = factors.iter().all(|factor| factor.bend.is_some());
+        let sums = |j: usize, part: fn(&Taylor) -> Interval| {
+            let matrices = function.coefficients.iter().map(|matrix| matrix.col_as_slice(j));
+            Interval::weighted_sums(rows, matrices.zip(factors.iter().map(part)))
+        };
+        let column = |j: usize| {
+            let (values, slopes) = (sums(j, |f| f.value), sums(j, |f| f.slope));
+            let bends = has_bend.then(|| sums(j, |f| f.bend.unwrap_or(Interval::ENTIRE)));
+            let entry = |i: usize| Taylor { value: values[i], slope: slopes[i], bend: bends.as_ref().map(|b| b[i]) };
+            (0..rows).map(entry).collect::<Vec<Taylor>>()
+        };
+        let entries: Vec<Vec<Taylor>> = (0..columns).map(column).collect();
+        Self::from_fn(rows, columns, |i, j| entries[j][i])
     }
 
     pub fn at(&self, i: usize, j: usize) -> Taylor {
@@ -125,8 +158,7 @@ impl CellMatrix {
     /// From the Taylor forms at the middle and over the cell; the symmetric part is taken.
     pub fn new(middle: &TaylorMatrix, over: &TaylorMatrix) -> Self {
         let n = middle.rows;
-        let symmetric =
-            |of: &dyn Fn(usize, usize) -> Interval| Enclosed::new(n, |i, j| (of(i, j) + of(j, i)) * 0.5);
+        let symmetric = |of: &dyn Fn(usize, usize) -> Interval| Enclosed::new(n, |i, j| (of(i, j) + of(j, i)) * 0.5);
         Self {
             n,
             value: symmetric(&|i, j| middle.at(i, j).value),

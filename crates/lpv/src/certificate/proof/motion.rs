@@ -17,7 +17,6 @@
 //! |w| < q y^{3/2} √γ / (2κ).
 //! ```
 
-use super::closed_loop::combine;
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use super::{COST_INFLATION_RATE_BOUNDED, Claim, Verdict};
 use crate::controller::{Governor, Motion};
@@ -25,7 +24,7 @@ use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
 use crate::math::interval::Interval;
 use crate::math::matrix::inverse_spd;
-use crate::math::taylor::{Taylor, TaylorDual};
+use crate::math::taylor::Taylor;
 use crate::model::MatrixFunction;
 use crate::plant::Plant;
 use crate::synthesis::Design;
@@ -204,14 +203,10 @@ fn matrices(governor: &Governor, motion: &Motion, plant: &dyn Plant, rho: Taylor
     let (x, u) = plant.trim_over(rho);
     let (a, b) = plant.jacobians_over(&x, &u);
     let (a, b) = (TaylorMatrix::new(n, n, a), TaylorMatrix::new(n, m, b));
-    let value = |function: &MatrixFunction| {
-        let factors: Vec<Taylor> = function.basis.iter().map(|basis| basis.at(&[rho])).collect();
-        combine(function, &factors)
-    };
+    let value = |function: &MatrixFunction| TaylorMatrix::of_function(function, rho);
     let slope = |function: &MatrixFunction| {
-        let rho = TaylorDual::new(rho, true);
-        let factors: Vec<Taylor> = function.basis.iter().map(|basis| basis.at(&[rho]).derivative).collect();
-        combine(function, &factors)
+        let [_, slope] = TaylorMatrix::of_function_and_derivative(function, rho);
+        slope
     };
     let unit =
         TaylorMatrix::from_fn(n, d, |i, j| Taylor::from(if i == governor.set_point_states[j] { 1.0 } else { 0.0 }));
@@ -266,10 +261,7 @@ fn absorbed(design: &Design, level: f64, low: f64, high: f64) -> f64 {
                 .fold(f64::INFINITY, f64::min);
             let y = EIGENVALUE_SHARE * least;
             let shift = TaylorMatrix::constant(&identity(n, y));
-            let matrix = |rho: Taylor| {
-                let factors: Vec<Taylor> = bounded.y.basis.iter().map(|basis| basis.at(&[rho])).collect();
-                combine(&bounded.y, &factors).minus(&shift)
-            };
+            let matrix = |rho: Taylor| TaylorMatrix::of_function(&bounded.y, rho).minus(&shift);
             let holds = |cell: Interval| {
                 let middle = cell.middle();
                 let half = (cell.hi() - middle).max(middle - cell.lo()) * (1.0 + 1e-12);
