@@ -91,39 +91,51 @@ impl Interval {
         Self { lo: square.lo.max(0.0), hi: square.hi }
     }
 
-    /// Σ wₖxₖ for vectors wₖ of `len` numbers, with one bound on the rounding of all of it.
+    /// A number near the middle and the distance to the farther end, rounded up: the interval lies in middle ± radius.
+    #[inline]
+    pub fn middle_and_radius(self) -> (f64, f64) {
+        if self.lo == self.hi {
+            return (self.lo, 0.0);
+        }
+        let middle = self.middle();
+        let distance = (self.hi - middle).max(middle - self.lo);
+        (middle, distance + (distance * WIDENING + f64::MIN_POSITIVE))
+    }
+
+    /// middle ± radius; the whole line where that is not finite.
+    #[inline]
+    pub fn around(middle: f64, radius: f64) -> Self {
+        if radius == 0.0 && middle.is_finite() {
+            return Self::point(middle);
+        }
+        Self::outward(middle - radius, middle + radius)
+    }
+
+    /// Σ wₖxₖ for vectors wₖ of `len` numbers, with one bound on the rounding of all of it. A sum without a term that is not zero is
+    /// exactly zero.
     ///
-    /// Each of N products and sums is wrong by at most 2⁻⁵³ of what it adds up to and 2⁻¹⁰⁷⁵, so that an end is at most
-    /// (N + 1)2⁻⁵³ Σ|wₖxₖ| + N 2⁻¹⁰⁷⁵ from the exact one; it is moved outwards by twice that and more. A sum without a term that is not
-    /// zero is exactly zero.
-    pub fn weighted_sums<'a>(len: usize, terms: impl Iterator<Item = (&'a [f64], Self)>) -> Vec<Self> {
-        let (mut lo, mut hi) = (vec![0.0; len], vec![0.0; len]);
-        let (mut magnitude, mut weight, mut count) = (vec![0.0; len], vec![0.0; len], 2.0);
-        for (weights, x) in terms.filter(|(_, x)| !x.is_zero()) {
-            count += 1.0;
-            if !x.magnitude().is_finite() {
+    /// With xₖ in mₖ ± rₖ each of N products wₖmₖ and sums is wrong by at most 2⁻⁵³ of what it adds up to and 2⁻¹⁰⁷⁵, so that the sum is at
+    /// most Σ|wₖ|rₖ + (N + 1)2⁻⁵³ Σ|wₖmₖ| + N 2⁻¹⁰⁷⁵ from the exact one. Twice that and more is taken, which covers the rounding of these
+    /// sums themselves for N up to a million.
+    pub fn weighted_sums<'a>(len: usize, terms: impl Iterator<Item = (&'a [f64], Self)> + Clone) -> Vec<Self> {
+        let terms = terms.filter(|(_, x)| !x.is_zero());
+        let count = (terms.clone().count() + 4) as f64;
+        let (mut middles, mut radii) = (vec![0.0; len], vec![0.0; len]);
+        for (weights, x) in terms {
+            let (middle, radius) = x.middle_and_radius();
+            let radius = radius * (1.0 + 1e-9) + middle.abs() * (count * f64::EPSILON) + f64::MIN_POSITIVE;
+            if !radius.is_finite() {
                 // 0 · ∞ is no number
-                weights.iter().zip(&mut magnitude).filter(|(w, _)| **w != 0.0).for_each(|(_, m)| *m = f64::INFINITY);
+                weights.iter().zip(&mut radii).filter(|(w, _)| **w != 0.0).for_each(|(_, r)| *r = f64::INFINITY);
                 continue;
             }
-            for (at, &w) in weights.iter().enumerate() {
-                let (a, b) = (w * x.lo, w * x.hi);
-                let (least, most) = if a < b { (a, b) } else { (b, a) };
-                lo[at] += least;
-                hi[at] += most;
-                magnitude[at] += if -least > most { -least } else { most };
-                weight[at] += w.abs();
+            for ((sum, total), w) in middles.iter_mut().zip(&mut radii).zip(weights) {
+                *sum += w * middle;
+                // what underflows to nothing is not forgotten
+                *total += w.abs() * radius + if *w == 0.0 { 0.0 } else { f64::MIN_POSITIVE };
             }
         }
-        let sum = |at: usize| {
-            if weight[at] == 0.0 && magnitude[at] == 0.0 {
-                return Self::point(0.0);
-            }
-            let widening = count * (magnitude[at] * f64::EPSILON + f64::MIN_POSITIVE);
-            let sum = Self { lo: lo[at] - widening, hi: hi[at] + widening };
-            if (sum.hi - sum.lo).is_finite() { sum } else { Self::ENTIRE }
-        };
-        (0..len).map(sum).collect()
+        middles.into_iter().zip(radii).map(|(middle, radius)| Self::around(middle, radius)).collect()
     }
 
     /// The ends moved outwards by more than the rounding of one operation; the whole line where one is not finite.

@@ -33,11 +33,9 @@ impl Enclosed {
     pub fn new(n: usize, entry: impl Fn(usize, usize) -> Interval) -> Self {
         let (mut middle, mut radius) = (Vec::with_capacity(n * n), Vec::with_capacity(n * n));
         for at in 0..n * n {
-            let entry = entry(at / n, at % n);
-            let (m, exact) = (entry.middle(), entry.lo() == entry.hi());
+            let (m, r) = entry(at / n, at % n).middle_and_radius();
             middle.push(m);
-            let distance = (entry.hi() - m).max(m - entry.lo());
-            radius.push(if exact { 0.0 } else { distance * (1.0 + 4.0 * UNIT) + UNDERFLOW });
+            radius.push(r);
         }
         Self { n, middle, radius }
     }
@@ -75,7 +73,7 @@ impl Enclosed {
     /// An entry.
     pub fn at(&self, i: usize, j: usize) -> Interval {
         let (middle, radius) = (self.middle[i * self.n + j], self.radius[i * self.n + j]);
-        if radius == 0.0 { Interval::point(middle) } else { Interval::point(middle) + Interval::new(-radius, radius) }
+        Interval::around(middle, radius)
     }
 
     /// Exactly zero.
