@@ -38,9 +38,12 @@ use std::time::Instant;
 /// largest rate is sought.
 const LEAST_HALF: f64 = 1.0 / 2048.0;
 const LEAST_HALF_OF_SEARCH: f64 = 1.0 / 1024.0;
-/// Parts that an open cell is cut into at most, and what their number is multiplied by.
+/// By how much the next attempt is narrower at most, and how much of the width is taken that a wider cell lets expect.
 const MOST_PARTS: f64 = 8.0;
 const FEWER: f64 = 0.95;
+/// What the rows of the next cell are to sum to, 1 being too much, and by how much it is wider at most.
+const AIM: f64 = 0.8;
+const MOST_GROWTH: f64 = 2.0;
 /// Cells reach over their ends by this, in pieces: far more than the rounding of their ends, which lie below 2^14.
 const OVERLAP: f64 = 1e-10;
 /// What the level of the certified set is multiplied by until it is proved: between grid points a little is lost.
@@ -111,54 +114,116 @@ impl<'a, M: Send + Sync> Cells<'a, M> {
 
     /// Prove `claims` of every cell, with cells of half-width at least `least`.
     fn prove(&mut self, least: f64, claims: &Judgement<M>) -> Attempt {
-        let enclose = &self.enclose;
-        let of_group = |cells: &mut Vec<Cell<M>>| {
-            let mut margin = f64::INFINITY;
-            let mut left = std::mem::take(cells);
-            left.reverse();
-            let mut outcome = None;
-            while let Some(cell) = left.pop() {
-                let Place { middle, half, .. } = cell.place;
-                if outcome.is_some() {
-                    cells.push(cell);
-                    continue;
-                }
-                let mut open: Option<f64> = None;
-                for (rate, definiteness) in claims(&cell.matrix, half) {
-                    match definiteness {
-                        Definiteness::Proved(found) => margin = margin.min(found),
-                        Definiteness::Refuted { direction, value } => {
-                            outcome = Some(Attempt::Refuted { t: middle, rate, direction, value });
-                        }
-                        Definiteness::Open { fits } => open = Some(open.map_or(fits, |other| other.min(fits))),
-                    }
-                }
-                let Some(fits) = open.filter(|_| outcome.is_none()) else {
-                    cells.push(cell);
-                    continue;
-                };
-                if 0.5 * half < least {
-                    outcome = Some(Attempt::Open { t: middle, half });
-                    cells.push(cell);
-                    continue;
-                }
-                // at once into as many as will do; bounds on a smaller cell are tighter, hence a little fewer
-                let wanted = if fits > 0.0 { (FEWER * half / fits).ceil() } else { 2.0 };
-                let parts = wanted.clamp(2.0, MOST_PARTS).min((half / least).floor());
-                // a little wider than their share, so that rounding leaves no gap
-                let (share, parts) = (half / parts, parts as usize);
-                let half = share + OVERLAP;
-                // the left one is next
-                for part in (0..parts).rev() {
-                    let middle = middle + share * (2 * part + 1) as f64 - share * parts as f64;
-                    let place = Place { middle, half, ..cell.place };
-                    left.push(Cell { place, matrix: enclose(&place) });
-                }
-            }
-            outcome.unwrap_or(Attempt::Proved(margin))
-        };
+        let of_group = |cells: &mut Vec<Cell<M>>| prove_group(cells, &self.enclose, least, claims);
         self.groups.par_iter_mut().map(of_group).reduce(|| Attempt::Proved(f64::INFINITY), worse)
     }
+}
+
+/// Prove `claims` of the cells of one group, from left to right. One that is open makes way for smaller ones, which follow each other
+/// like the steps of an integrator: each as wide as the margin of the one before lets expect.
+fn prove_group<M>(cells: &mut Vec<Cell<M>>, enclose: &Enclose<M>, least: f64, claims: &Judgement<M>) -> Attempt {
+    let mut margin = f64::INFINITY;
+    let mut known = std::mem::take(cells).into_iter();
+    while let Some(cell) = known.next() {
+        let place = cell.place;
+        let outcome = match judge(claims, &cell) {
+            Judged::Proved(found) => {
+                margin = margin.min(found);
+                cells.push(cell);
+                continue;
+            }
+            Judged::Refuted(refuted) => {
+                cells.push(cell);
+                Some(refuted)
+            }
+            Judged::Open { fits } => {
+                let mut smaller = Vec::new();
+                let outcome = match step_through(&place, fits, enclose, least, claims, &mut smaller) {
+                    Attempt::Proved(found) => {
+                        margin = margin.min(found);
+                        None
+                    }
+                    other => Some(other),
+                };
+                // a cell that was not done in full stays as it was
+                if outcome.is_none() {
+                    cells.extend(smaller)
+                } else {
+                    cells.push(cell)
+                }
+                outcome
+            }
+        };
+        if let Some(outcome) = outcome {
+            cells.extend(known);
+            return outcome;
+        }
+    }
+    Attempt::Proved(margin)
+}
+
+/// Prove `claims` on a place by cells that are narrower, the first of half-width `fits`.
+fn step_through<M>(
+    place: &Place,
+    fits: f64,
+    enclose: &Enclose<M>,
+    least: f64,
+    claims: &Judgement<M>,
+    done: &mut Vec<Cell<M>>,
+) -> Attempt {
+    let (mut from, to) = (place.middle - place.half, place.middle + place.half);
+    let mut margin = f64::INFINITY;
+    let narrower =
+        |half: f64, fits: f64| (FEWER * fits).min(0.5 * half).max(half / MOST_PARTS).max(least.min(0.5 * half));
+    let mut half = narrower(place.half, fits);
+    while from < to {
+        if half < least {
+            return Attempt::Open { t: from, half };
+        }
+        let share = 0.5 * (to - from) / (0.5 * (to - from) / half).ceil();
+        // a little wider than its share, so that rounding leaves no gap
+        let place = Place { middle: from + share, half: share + OVERLAP, ..*place };
+        let cell = Cell { place, matrix: enclose(&place) };
+        match judge(claims, &cell) {
+            Judged::Proved(found) => {
+                margin = margin.min(found);
+                half = share * (AIM / (1.0 - found)).sqrt().clamp(1.0, MOST_GROWTH);
+                from += 2.0 * share;
+                // what is left may be no more than the overlap
+                if to - from <= OVERLAP {
+                    from = to;
+                }
+                done.push(cell);
+            }
+            Judged::Refuted(refuted) => return refuted,
+            Judged::Open { fits } => half = narrower(share, fits),
+        }
+    }
+    Attempt::Proved(margin)
+}
+
+/// What all claims together say of one cell.
+enum Judged {
+    Proved(f64),
+    Refuted(Attempt),
+    /// The widest half-width that might do.
+    Open {
+        fits: f64,
+    },
+}
+
+fn judge<M>(claims: &Judgement<M>, cell: &Cell<M>) -> Judged {
+    let (mut margin, mut open) = (f64::INFINITY, None::<f64>);
+    for (rate, definiteness) in claims(&cell.matrix, cell.place.half) {
+        match definiteness {
+            Definiteness::Proved(found) => margin = margin.min(found),
+            Definiteness::Refuted { direction, value } => {
+                return Judged::Refuted(Attempt::Refuted { t: cell.place.middle, rate, direction, value });
+            }
+            Definiteness::Open { fits } => open = Some(open.map_or(fits, |other| other.min(fits))),
+        }
+    }
+    open.map_or(Judged::Proved(margin), |fits| Judged::Open { fits })
 }
 
 /// What is to be proved of a design.

@@ -285,7 +285,7 @@ fn sin_cos_of_number(x: f64) -> (Interval, Interval) {
     // Σ (−1)ᵏ y²ᵏ⁺ᵖ/(2k + p)! for p = 0 and 1
     let series = |first: Interval, offset: f64| {
         let (mut term, mut sum, mut n) = (first, first, offset);
-        for _ in 0..12 {
+        for _ in 0..9 {
             term = -(term * square / ((n + 1.0) * (n + 2.0)));
             sum = sum + term;
             n += 2.0;
