@@ -173,8 +173,11 @@ fn step_through<M>(
 ) -> Attempt {
     let (mut from, to) = (place.middle - place.half, place.middle + place.half);
     let mut margin = f64::INFINITY;
-    let narrower =
-        |half: f64, fits: f64| (FEWER * fits).min(0.5 * half).max(half / MOST_PARTS).max(least.min(0.5 * half));
+    // not below `least` before that was tried
+    let narrower = |half: f64, fits: f64| {
+        let next = (FEWER * fits).min(0.5 * half).max(half / MOST_PARTS);
+        if half > 1.001 * least { next.max(least) } else { next }
+    };
     let mut half = narrower(place.half, fits);
     while from < to {
         if half < least {
