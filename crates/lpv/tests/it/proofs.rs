@@ -9,8 +9,11 @@ use lpv::math::Mat;
 use lpv::math::matrix::{diagonal, quadratic_form};
 use lpv::model::{MatrixFunction, Polytope, linearize};
 use lpv::plant::{LinearParameters, PlantSpec};
+use lpv::sim::RungeKutta4;
 use lpv::synthesis::polytopic::InputBounds;
-use lpv::synthesis::{CostWeights, Design, DesignRequest, Method, RateBoundedOptions, ScheduleKind, design};
+use lpv::synthesis::{
+    CostWeights, Design, DesignRequest, HighGainOptions, Method, RateBoundedOptions, ScheduleKind, design,
+};
 
 /// A stream of numbers in (−1, 1) from a seed.
 struct Numbers(u64);
@@ -253,11 +256,16 @@ fn rates_of_the_frozen_designs() {
 
 /// SLPVQR with γ = 1, made for yaw rates up to 2 rad/s and for the reach along x.
 fn made_for_a_rate() -> Design {
+    made_for(Method::Slpvqr { gamma: 1.0 })
+}
+
+/// A saturated method, made for yaw rates up to 2 rad/s and for the reach along x.
+fn made_for(method: Method) -> Design {
     let mut direction = vec![0.0; 12];
     direction[3] = 1.0;
     let request = DesignRequest {
         name: "proved".into(),
-        method: Method::Slpvqr { gamma: 1.0 },
+        method,
         weights: weights(),
         grid_points: 32,
         schedule: ScheduleKind::Grid,
@@ -318,6 +326,74 @@ fn a_design_for_a_rate_is_proved_and_samples_agree() {
 #[ignore = "a million samples: run it in release"]
 fn a_million_samples_agree() {
     proved_and_sampled(20_000, 50);
+}
+
+/// Flights of the LPV model with the saturated high gain from the edge of the proved set, the parameter turning to and fro at its largest
+/// rate: V falls all the way, and the cost stays below its bound.
+fn saturated_flights_stay(flights: usize, duration_s: f64) {
+    const STEP_S: f64 = 1e-3;
+    let (plant, design) =
+        (plant(), made_for(Method::HighGainSlpvqr { gamma: 1.0, high_gain: HighGainOptions::default() }));
+    let proofs = prove(&design, &*plant, &ProofOptions::default()).unwrap();
+    let (invariant, cost) = (claim(&proofs.claims, "is invariant"), claim(&proofs.claims, "the cost is at most"));
+    assert_eq!((invariant.verdict, cost.verdict), (Verdict::Proved, Verdict::Proved), "{:?}", proofs.claims);
+    let (level, rate) = (proofs.level.unwrap(), proofs.stable_up_to.unwrap());
+    assert_eq!((level, rate), (1.0, 2.0));
+    let operating = &design.controller.operating_input;
+    let mut numbers = Numbers(29);
+    let mut flights_at_limits = 0;
+    for flight in 0..flights {
+        let mut rho = 3.2 * numbers.next();
+        let p = lyapunov_matrix(&design, &*plant, rho).unwrap();
+        let mut x: Vec<f64> = (0..12).map(|_| numbers.next()).collect();
+        let scale = (level / quadratic_form(&p, &x)).sqrt();
+        x.iter_mut().for_each(|value| *value *= scale);
+        x.push(0.0); // the cost
+        let (mut before, mut turn_in) = (level, 0.0);
+        let mut direction = 1.0;
+        let mut integrator = RungeKutta4::new(13);
+        let mut saturates = false;
+        for _ in 0..(duration_s / STEP_S) as usize {
+            turn_in -= STEP_S;
+            if turn_in < 0.0 {
+                (direction, turn_in) = (-direction, 0.3 * numbers.next().abs());
+            }
+            let from = rho;
+            integrator.step(0.0, STEP_S, &mut x, |t, z, slope| {
+                let rho = from + direction * rate * t;
+                let model = linearize(&*plant, rho);
+                let k = design.controller.schedule.gain_matrix(rho);
+                let mut u: Vec<f64> =
+                    (0..4).map(|i| operating[i] - (0..12).map(|j| k[(i, j)] * z[j]).sum::<f64>()).collect();
+                saturates |= design.controller.limits.saturate(&mut u);
+                u.iter_mut().zip(operating).for_each(|(u, trim)| *u -= trim);
+                for i in 0..12 {
+                    slope[i] = (0..12).map(|j| model.a[(i, j)] * z[j]).sum::<f64>()
+                        + (0..4).map(|j| model.b[(i, j)] * u[j]).sum::<f64>();
+                }
+                slope[12] = quadratic_form(&design.weights.q, &z[..12]) + quadratic_form(&design.weights.r, &u);
+            });
+            rho += direction * rate * STEP_S;
+            let now = quadratic_form(&lyapunov_matrix(&design, &*plant, rho).unwrap(), &x[..12]);
+            assert!(now < before, "flight {flight}: V went from {before} to {now} at yaw {rho}");
+            before = now;
+        }
+        assert!(x[12] <= proofs.cost_factor * level, "flight {flight} cost {}", x[12]);
+        flights_at_limits += usize::from(saturates);
+    }
+    // otherwise the limits were not put to the test
+    assert!(2 * flights_at_limits > flights, "{flights_at_limits} of {flights} flights saturated");
+}
+
+#[test]
+fn saturated_flights_of_the_model_stay_in_the_proved_set() {
+    saturated_flights_stay(4, 0.5);
+}
+
+#[test]
+#[ignore = "hundreds of flights: run it in release"]
+fn hundreds_of_saturated_flights_stay_in_the_proved_set() {
+    saturated_flights_stay(300, 5.0);
 }
 
 /// Of the nonlinear plant: in the proved set V falls along its equations with the gain that flies, and the set is in the box.
