@@ -52,7 +52,8 @@ fn run_gain(arguments: &DesignArguments, text: &str) -> Result<(), Failure> {
     if let Some(place) = place {
         place.finish(json.as_bytes())?;
     }
-    print(&if arguments.output.json { json } else { report.text() })
+    print(&if arguments.output.json { json } else { report.text() })?;
+    report.failure(&arguments.file).map_or(Ok(()), Err)
 }
 
 fn run_scenario(arguments: &DesignArguments) -> Result<(), Failure> {

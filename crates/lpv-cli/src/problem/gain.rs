@@ -67,6 +67,16 @@ pub struct GainReport {
 }
 
 impl GainReport {
+    /// A bound that holds on the grid alone is none.
+    pub fn failure(&self, file: &Path) -> Option<Failure> {
+        let missed = || {
+            let Self { claim, verdict, .. } = self;
+            let message = "between the grid points the bound is";
+            Failure::NotCertified(format!("{}: {message} {} ({})", file.display(), verdict.word(), claim.detail))
+        };
+        (self.verdict != Verdict::Proved).then(missed)
+    }
+
     /// The answer as text.
     pub fn text(&self) -> String {
         format!(

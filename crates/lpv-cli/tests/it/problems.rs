@@ -288,6 +288,10 @@ fn the_commutator_has_its_induced_norm() {
         close(&answer["gain"], expected, 1e-4);
         assert_eq!(answer["verdict"], "proved", "{answer}");
     }
+    // a cubic P on three points fits them and nothing between
+    Place::with(edited(COMMUTATOR, "grid_points = 10", "grid_points = 3"))
+        .lpv("design scenario.toml")
+        .refuses(4, &["grid points"]);
     Place::with(edited(COMMUTATOR, "range = [-1, 1]", "range = [1, -1]"))
         .lpv("design scenario.toml")
         .refuses(2, &["model.range", "ascend"]);

@@ -10,6 +10,7 @@
 //! and what is not.
 
 mod closed_loop;
+mod difference;
 mod enclosed;
 mod gain;
 mod matrix;

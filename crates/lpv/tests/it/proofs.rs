@@ -367,8 +367,8 @@ fn saturated_flights_stay(flights: usize, duration_s: f64) {
                     (0..4).map(|i| operating[i] - (0..12).map(|j| k[(i, j)] * z[j]).sum::<f64>()).collect();
                 saturates |= design.controller.limits.saturate(&mut u);
                 u.iter_mut().zip(operating).for_each(|(u, trim)| *u -= trim);
-                for i in 0..12 {
-                    slope[i] = (0..12).map(|j| model.a[(i, j)] * z[j]).sum::<f64>()
+                for (i, slope) in slope[..12].iter_mut().enumerate() {
+                    *slope = (0..12).map(|j| model.a[(i, j)] * z[j]).sum::<f64>()
                         + (0..4).map(|j| model.b[(i, j)] * u[j]).sum::<f64>();
                 }
                 slope[12] = quadratic_form(&design.weights.q, &z[..12]) + quadratic_form(&design.weights.r, &u);

@@ -227,6 +227,12 @@ impl CellMatrix {
         self.value.middle()
     }
 
+    /// The inverse of the middle, as numbers; `None` where that is not definite.
+    pub fn middle_inverse(&self) -> Option<Mat<f64>> {
+        let factor = cholesky_inverse(&self.middle())?;
+        Some(factor.transpose() * &factor)
+    }
+
     /// Nothing is known.
     pub fn unbounded(n: usize) -> Self {
         let nothing = Enclosed::unbounded(n);

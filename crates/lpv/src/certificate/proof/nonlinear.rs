@@ -16,14 +16,15 @@
 //! The inputs are taken along the right singular vectors of B, the columns of M, along which the equations decouple: four
 //! rotors that tilt the thrust do so by their sum. M is rounded, so that B_ΔS = (B_ΔM)(MᵀS) + B_Δ(I − MMᵀ)S.
 
-use super::closed_loop::{ClosedLoop, Decrease, Form, Parts, Place, Row};
+use super::closed_loop::{ClosedLoop, Decrease, Parts, Place, Row};
+use super::difference::{Balance, Difference};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use super::{Attempt, COST_INFLATION, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH, Words};
 use crate::certificate::{Claim, Verdict};
 use crate::math::Mat;
 use crate::math::eigen::symmetric_eigenvectors;
 use crate::math::interval::Interval;
-use crate::math::matrix::{cholesky_inverse, diagonal, identity, quadratic_form};
+use crate::math::matrix::{identity, quadratic_form};
 use crate::math::taylor::Taylor;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -83,15 +84,6 @@ struct Bounds {
     parameter: Option<usize>,
     /// Of |uᵢ − u*ᵢ|.
     inputs: Vec<f64>,
-}
-
-/// Bounds dᵢⱼ on the differences of A_Δ to A(ρ) and of B_Δ to B(ρ) on a part of a piece, and of ρ̇.
-#[derive(Clone)]
-struct Difference {
-    state: Mat<f64>,
-    /// n × 2m: of (B_Δ − B)M and of (B_Δ − B)(I − MMᵀ).
-    input: Mat<f64>,
-    rate: Interval,
 }
 
 /// What linearisation leaves out, on the whole range of the parameter.
@@ -223,16 +215,6 @@ impl Bounds {
             Taylor::constant(Interval::new(lo, hi))
         };
         operating.iter().enumerate().map(around).collect()
-    }
-}
-
-impl Difference {
-    fn hull(mut self, other: &Self) -> Self {
-        let larger = |a: &Mat<f64>, b: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)].max(b[(i, j)]));
-        self.state = larger(&self.state, &other.state);
-        self.input = larger(&self.input, &other.input);
-        self.rate = self.rate.hull(other.rate);
-        self
     }
 }
 
@@ -457,69 +439,5 @@ impl ClosedLoop<'_> {
         };
         let over = inputs(&bounds.around(&x, 1.0), &bounds.inputs_around(&u, self.limits));
         (mean.minus(&states(&x)), over.minus(&inputs(&x, &u)))
-    }
-}
-
-/// The weights of Σ d (τ aaᵀ + bbᵀ/τ), gathered by columns: the τ make both terms equally large against the decrease.
-struct Balance {
-    /// Of the a, for each row of A and B.
-    row: Mat<f64>,
-    /// Of the b, for each column of A.
-    state: Mat<f64>,
-    /// Of the b, for each column of B.
-    input: Mat<f64>,
-}
-
-impl Balance {
-    fn new(form: &Form, parts: &Parts, difference: &Difference, inverse: &Mat<f64>) -> Self {
-        let n = inverse.nrows();
-        let unit = |i: usize| (0..n).map(|k| if k == i { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-        let lyapunov = |i: usize| (0..n).map(|k| parts.lyapunov.at(i, k).value.middle()).collect::<Vec<f64>>();
-        let gain = |i: usize| (0..n).map(|k| parts.gain.at(i, k).value.middle()).collect::<Vec<f64>>();
-        let size = |vector: Vec<f64>| quadratic_form(inverse, &vector).max(0.0).sqrt();
-        let (rows, columns): (Vec<f64>, Vec<f64>) = match form {
-            Form::Direct(_) => (0..n).map(|i| (size(lyapunov(i)), size(unit(i)))).unzip(),
-            Form::Inverse(_) => (0..n).map(|i| (size(unit(i)), size(lyapunov(i)))).unzip(),
-        };
-        let m = difference.input.ncols();
-        let inputs: Vec<f64> = (0..m).map(|i| size(gain(i))).collect();
-        let (mut row, mut state, mut input) = (vec![0.0; n], vec![0.0; n], vec![0.0; m]);
-        let mut add = |i: usize, d: f64, b: f64, weight: &mut f64| {
-            if d == 0.0 || b == 0.0 {
-                return;
-            }
-            let tau = b / rows[i];
-            // rounded up, so that no product is less than it stands for
-            row[i] += (d * tau).next_up();
-            *weight += (d / tau).next_up();
-        };
-        for i in 0..n {
-            for j in 0..n {
-                add(i, difference.state[(i, j)], columns[j], &mut state[j]);
-            }
-            for j in 0..m {
-                add(i, difference.input[(i, j)], inputs[j], &mut input[j]);
-            }
-        }
-        // of the sums and of τ·(1/τ)
-        let up = |weights: Vec<f64>| diagonal(&weights.into_iter().map(|w| w * (1.0 + 1e-12)).collect::<Vec<f64>>());
-        Self { row: up(row), state: up(state), input: up(input) }
-    }
-
-    fn spread(&self, form: &Form, parts: &Parts) -> TaylorMatrix {
-        let inputs = parts.gain.quadratic(&self.input);
-        let (lyapunov, constant) = match form {
-            Form::Direct(_) => (&self.row, &self.state),
-            Form::Inverse(_) => (&self.state, &self.row),
-        };
-        inputs.plus(&parts.lyapunov.quadratic(lyapunov)).plus(&TaylorMatrix::constant(constant))
-    }
-}
-
-impl CellMatrix {
-    /// The inverse of the middle, as numbers; `None` where that is not definite.
-    fn middle_inverse(&self) -> Option<Mat<f64>> {
-        let factor = cholesky_inverse(&self.middle())?;
-        Some(factor.transpose() * &factor)
     }
 }
