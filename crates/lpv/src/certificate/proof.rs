@@ -126,7 +126,6 @@ fn prove_group<M>(cells: &mut Vec<Cell<M>>, enclose: &Enclose<M>, least: f64, cl
     let mut margin = f64::INFINITY;
     let mut known = std::mem::take(cells).into_iter();
     while let Some(cell) = known.next() {
-        let place = cell.place;
         let outcome = match judge(claims, &cell) {
             Judged::Proved(found) => {
                 margin = margin.min(found);
@@ -137,23 +136,13 @@ fn prove_group<M>(cells: &mut Vec<Cell<M>>, enclose: &Enclose<M>, least: f64, cl
                 cells.push(cell);
                 Some(refuted)
             }
-            Judged::Open { fits } => {
-                let mut smaller = Vec::new();
-                let outcome = match step_through(&place, fits, enclose, least, claims, &mut smaller) {
-                    Attempt::Proved(found) => {
-                        margin = margin.min(found);
-                        None
-                    }
-                    other => Some(other),
-                };
-                // a cell that was not done in full stays as it was
-                if outcome.is_none() {
-                    cells.extend(smaller)
-                } else {
-                    cells.push(cell)
+            Judged::Open { fits } => match step_through(cell, fits, enclose, least, claims, cells) {
+                Attempt::Proved(found) => {
+                    margin = margin.min(found);
+                    None
                 }
-                outcome
-            }
+                other => Some(other),
+            },
         };
         if let Some(outcome) = outcome {
             cells.extend(known);
@@ -163,44 +152,55 @@ fn prove_group<M>(cells: &mut Vec<Cell<M>>, enclose: &Enclose<M>, least: f64, cl
     Attempt::Proved(margin)
 }
 
-/// Prove `claims` on a place by cells that are narrower, the first of half-width `fits`.
+/// Prove `claims` on the place of a cell by cells that are narrower, the first of half-width `fits`; they are added to `done`, and where they
+/// do not come to the end, a cell for what is left.
 fn step_through<M>(
-    place: &Place,
+    cell: Cell<M>,
     fits: f64,
     enclose: &Enclose<M>,
     least: f64,
     claims: &Judgement<M>,
     done: &mut Vec<Cell<M>>,
 ) -> Attempt {
-    let (mut from, to) = (place.middle - place.half, place.middle + place.half);
-    let mut margin = f64::INFINITY;
+    let whole = cell.place;
+    let (begin, to) = (whole.middle - whole.half, whole.middle + whole.half);
+    let (mut from, mut margin) = (begin, f64::INFINITY);
+    // a little wider than its share, so that rounding leaves no gap
+    let new = |from: f64, share: f64| {
+        let place = Place { middle: from + share, half: share + OVERLAP, ..whole };
+        Cell { place, matrix: enclose(&place) }
+    };
     // not below `least` before that was tried
     let narrower = |half: f64, fits: f64| {
         let next = (FEWER * fits).min(0.5 * half).max(half / MOST_PARTS);
         if half > 1.001 * least { next.max(least) } else { next }
     };
-    let mut half = narrower(place.half, fits);
-    while from < to {
-        if half < least {
-            return Attempt::Open { t: from, half };
-        }
-        let share = 0.5 * (to - from) / (0.5 * (to - from) / half).ceil();
-        // a little wider than its share, so that rounding leaves no gap
-        let place = Place { middle: from + share, half: share + OVERLAP, ..*place };
-        let cell = Cell { place, matrix: enclose(&place) };
-        match judge(claims, &cell) {
-            Judged::Proved(found) => {
-                margin = margin.min(found);
-                half = share * (AIM / (1.0 - found)).sqrt().clamp(1.0, MOST_GROWTH);
-                from += 2.0 * share;
-                // what is left may be no more than the overlap
-                if to - from <= OVERLAP {
-                    from = to;
+    let mut half = narrower(whole.half, fits);
+    // what is left may be no more than the overlap
+    while to - from > OVERLAP {
+        let judged = if half < least {
+            Err(Attempt::Open { t: from, half })
+        } else {
+            let share = 0.5 * (to - from) / (0.5 * (to - from) / half).ceil();
+            let next = new(from, share);
+            match judge(claims, &next) {
+                Judged::Proved(found) => {
+                    margin = margin.min(found);
+                    half = share * (AIM / (1.0 - found)).sqrt().clamp(1.0, MOST_GROWTH);
+                    from += 2.0 * share;
+                    done.push(next);
+                    Ok(())
                 }
-                done.push(cell);
+                Judged::Open { fits } => {
+                    half = narrower(share, fits);
+                    Ok(())
+                }
+                Judged::Refuted(refuted) => Err(refuted),
             }
-            Judged::Refuted(refuted) => return refuted,
-            Judged::Open { fits } => half = narrower(share, fits),
+        };
+        if let Err(outcome) = judged {
+            done.push(if from == begin { cell } else { new(from, 0.5 * (to - from)) });
+            return outcome;
         }
     }
     Attempt::Proved(margin)

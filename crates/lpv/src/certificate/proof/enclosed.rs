@@ -55,13 +55,12 @@ impl Enclosed {
             for at in 0..n * n {
                 let term = weight * matrix.middle[at];
                 middle[at] += term;
-                radius[at] += weight.abs() * matrix.radius[at] + lost * term.abs();
+                // what underflows to nothing is not forgotten
+                let underflow = if matrix.middle[at] == 0.0 && matrix.radius[at] == 0.0 { 0.0 } else { UNDERFLOW };
+                radius[at] += weight.abs() * matrix.radius[at] + lost * term.abs() + underflow;
             }
         }
-        for (at, radius) in radius.iter_mut().enumerate() {
-            let known = *radius == 0.0 && middle[at] == 0.0;
-            *radius = if known { 0.0 } else { *radius * ROUNDED_UP + UNDERFLOW };
-        }
+        radius.iter_mut().for_each(|radius| *radius *= ROUNDED_UP);
         Self { n, middle, radius }
     }
 
