@@ -76,7 +76,7 @@ pub(crate) fn largest_entry(m: &Mat<f64>) -> f64 {
 }
 
 /// The largest absolute value; NaN if there is one.
-pub(crate) fn largest(values: &[f64]) -> f64 {
+fn largest(values: &[f64]) -> f64 {
     // Eight running maxima, and a sum that is NaN when an entry is: both go without branches.
     let (mut most, mut sum) = ([0.0_f64; 8], [0.0_f64; 8]);
     let chunks = values.chunks_exact(8);

@@ -3,7 +3,7 @@
 //! The range is cut into cells. On each cell the matrix of a claim is enclosed by its Taylor form of second order in
 //! interval arithmetic: the plant's equations, their Jacobians, the schedule that flies and the Lyapunov function are all
 //! evaluated over intervals, none is sampled. Gershgorin's theorem after a congruence then proves it definite on the whole
-//! cell, or an eigenvector in interval arithmetic refutes it in the middle, or the cell is halved. The claims are affine in
+//! cell, or an eigenvector in interval arithmetic refutes it in the middle, or narrower cells take its place. The claims are affine in
 //! the parameter's rate, so that both ends of its interval are enough.
 //!
 //! The solver is not asked, and no number but P (or Y), the gains and the model enters. `docs/proved.md` says what is proved
@@ -35,12 +35,12 @@ use matrix::{CellMatrix, Definiteness};
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// Half-widths of cells, in pieces, below which a cell is not halved any more: for a claim that is asked for, and while the
+/// Half-widths of cells, in pieces, below which no narrower one is tried: for a claim that is asked for, and while the
 /// largest rate is sought.
 const LEAST_HALF: f64 = 1.0 / 2048.0;
 const LEAST_HALF_OF_SEARCH: f64 = 1.0 / 1024.0;
 /// By how much the next attempt is narrower at most, and how much of the width is taken that a wider cell lets expect.
-const MOST_PARTS: f64 = 8.0;
+const MOST_SHRINKAGE: f64 = 8.0;
 const FEWER: f64 = 0.95;
 /// What the rows of the next cell are to sum to, 1 being too much, and by how much it is wider at most.
 const AIM: f64 = 0.8;
@@ -172,7 +172,7 @@ fn step_through<M>(
     };
     // not below `least` before that was tried
     let narrower = |half: f64, fits: f64| {
-        let next = (FEWER * fits).min(0.5 * half).max(half / MOST_PARTS);
+        let next = (FEWER * fits).min(0.5 * half).max(half / MOST_SHRINKAGE);
         if half > 1.001 * least { next.max(least) } else { next }
     };
     let mut half = narrower(whole.half, fits);

@@ -69,19 +69,18 @@ impl TaylorMatrix {
     /// Product, each of the products of values and derivatives by middles and radii with one bound on its rounding.
     pub fn times(&self, other: &Self) -> Self {
         debug_assert_eq!(self.columns, other.rows);
-        let (rows, inner, columns) = (self.rows, self.columns, other.columns);
         let [left, right] = [self.parts(), other.parts()];
-        let product = |terms: &[(&Part, &Part, f64)]| Part::sum_of_products([rows, inner, columns], terms);
+        let product = Enclosed::sum_of_products;
         let value = product(&[(&left.value, &right.value, 1.0)]);
         let slope = product(&[(&left.slope, &right.value, 1.0), (&left.value, &right.slope, 1.0)]);
         let bend = (left.bend.as_ref().zip(right.bend.as_ref()))
             .map(|(f, g)| product(&[(f, &right.value, 1.0), (&left.slope, &right.slope, 2.0), (&left.value, g, 1.0)]));
         let entry = |at: usize| Taylor { value: value[at], slope: slope[at], bend: bend.as_ref().map(|bend| bend[at]) };
-        Self::new(rows, columns, (0..rows * columns).map(entry).collect())
+        Self::new(self.rows, other.columns, (0..value.len()).map(entry).collect())
     }
 
     fn parts(&self) -> TaylorParts {
-        let part = |of: &dyn Fn(&Taylor) -> Interval| Part::new(self.entries.iter().map(of));
+        let part = |of: &dyn Fn(&Taylor) -> Interval| Enclosed::of_entries(self.columns, self.entries.iter().map(of));
         let has_bend = self.entries.iter().all(|entry| entry.bend.is_some());
         TaylorParts {
             value: part(&|entry| entry.value),
@@ -112,64 +111,11 @@ impl TaylorMatrix {
     }
 }
 
-/// The entries of a matrix of intervals: middles and radii in row order.
-struct Part {
-    middle: Vec<f64>,
-    radius: Vec<f64>,
-}
-
 /// Values and derivatives of a matrix of Taylor forms.
 struct TaylorParts {
-    value: Part,
-    slope: Part,
-    bend: Option<Part>,
-}
-
-impl Part {
-    fn new(entries: impl Iterator<Item = Interval>) -> Self {
-        let (middle, radius) = entries.map(Interval::middle_and_radius).unzip();
-        Self { middle, radius }
-    }
-
-    /// Σ w F G for factors w that are powers of two. For entries in f ± r and g ± q a product is in fg ± (|f|q + r(|g| + q)); that and all
-    /// sums are rounded as in [`Interval::weighted_sums`]. Products with exact zeros are left out.
-    fn sum_of_products([rows, inner, columns]: [usize; 3], terms: &[(&Part, &Part, f64)]) -> Vec<Interval> {
-        let lost = ((terms.len() * inner + 4) as f64) * f64::EPSILON;
-        let mut sums = vec![Interval::point(0.0); rows * columns];
-        // of the right factors: |g| and what is multiplied by |f|
-        let sizes: Vec<(Vec<f64>, Vec<f64>)> = (terms.iter())
-            .map(|(_, right, _)| {
-                let size = |(g, q): (&f64, &f64)| {
-                    (g.abs() * (1.0 + 1e-9) + q * (1.0 + 1e-9), q * (1.0 + 1e-9) + g.abs() * lost)
-                };
-                right.middle.iter().zip(&right.radius).map(size).unzip()
-            })
-            .collect();
-        let (mut middles, mut radii) = (vec![0.0; columns], vec![0.0; columns]);
-        for i in 0..rows {
-            middles.fill(0.0);
-            radii.fill(0.0);
-            for ((left, right, factor), (whole, spread)) in terms.iter().zip(&sizes) {
-                for k in 0..inner {
-                    let (f, r) = (factor * left.middle[i * inner + k], factor * left.radius[i * inner + k]);
-                    if f == 0.0 && r == 0.0 {
-                        continue;
-                    }
-                    let row = k * columns..(k + 1) * columns;
-                    let entries = right.middle[row.clone()].iter().zip(&whole[row.clone()]).zip(&spread[row]);
-                    for ((sum, radius), ((g, whole), spread)) in middles.iter_mut().zip(&mut radii).zip(entries) {
-                        *sum += f * g;
-                        // 0 · ∞ is no number, and makes the sum the whole line
-                        *radius += f.abs() * spread + r * whole + if *whole == 0.0 { 0.0 } else { f64::MIN_POSITIVE };
-                    }
-                }
-            }
-            for ((sum, middle), radius) in sums[i * columns..(i + 1) * columns].iter_mut().zip(&middles).zip(&radii) {
-                *sum = if radius.is_nan() { Interval::ENTIRE } else { Interval::around(*middle, *radius) };
-            }
-        }
-        sums
-    }
+    value: Enclosed,
+    slope: Enclosed,
+    bend: Option<Enclosed>,
 }
 
 /// M(t) ∈ value + (t − c) slope + ½(t − c)² bend on a cell, symmetric, n × n.
