@@ -1,36 +1,39 @@
 //! The Schur complement of all factored blocks together.
 //!
-//! With `W = [U V]` the entries are sums over the blocks of products of entries of `WᵀPW` and `WᵀZW` (see [`crate::factored`]). One row
-//! of the Schur complement is gone through block by block, as a sum of outer products over the places of the stacks; blocks whose
-//! stacks hold the same row of a matrix unknown, such as the 2^m vertices of a saturated design, add to the same line, and each line
-//! is spread over the unknowns once.
+//! With `W = [U V]` the entries are sums over the blocks of products of entries of `WᵀPW` and `WᵀZW` (see [`crate::factored`]). A row of a
+//! stack is a line of unknowns, those of its places. For two lines, and all their places at once, a block adds
+//!
+//! ```text
+//! (VᵀPu_r)(VᵀZu_p)ᵀ + (VᵀZu_r)(VᵀPu_p)ᵀ + (u_rᵀZu_p) VᵀPV + (u_pᵀPu_r) VᵀZV .
+//! ```
+//!
+//! Blocks that hold the same lines, such as the 2^m vertices of a saturated design, add to the same sum. When all have, the sum is
+//! spread over the unknowns, of which a symmetric one has two places.
 
 use crate::block::Block;
 use crate::dense::axpy;
-use crate::factored::{Factored, NO_UNKNOWN, PADDING};
+use crate::factored::{Factored, Group, NO_UNKNOWN, PADDING};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// A row of a stack, as blocks share it: the scalar unknowns at its places.
+/// The scalar unknowns at the places of a row of a stack.
 #[derive(Debug)]
 struct Line {
     positions: Vec<usize>,
-    /// The first one, where they run on one after the other.
-    run: Option<usize>,
-    last: usize,
-    /// Where its sum begins.
-    start: usize,
+    /// How many run on one after the other, at the beginning.
+    run: usize,
 }
 
-/// A stack of a block: columns `u..` and `v..` of W, and for each row where its line's sum begins.
-#[derive(Debug)]
-struct Target {
+/// A row of a stack of a block.
+#[derive(Clone, Copy, Debug)]
+struct Row {
+    line: usize,
+    group: usize,
+    /// Places in W of u and of the first column of V.
     u: usize,
     v: usize,
-    width: usize,
-    starts: Vec<usize>,
-    /// The last unknown among each [`PADDING`] columns of each row.
-    lasts: Vec<Vec<usize>>,
+    weight: f64,
+    symmetric: bool,
 }
 
 /// One block.
@@ -38,26 +41,34 @@ struct Target {
 struct Part {
     /// Columns of W.
     w: usize,
-    targets: Vec<Target>,
     wpw: Vec<f64>,
     wzw: Vec<f64>,
 }
 
-/// The places of a scalar unknown in one stack of a block: one, or two of a symmetric unknown.
+/// A pair of rows of one block.
 #[derive(Debug)]
-struct Source {
+struct Pair {
     part: usize,
-    /// Where the rows of `WᵀPW` for u and v begin.
-    places: [(usize, usize); 2],
-    count: usize,
+    rows: [Row; 2],
+    /// Where the sum of their lines begins.
+    sum: usize,
 }
 
-/// A row of the Schur complement.
+/// The sum of two lines.
 #[derive(Debug)]
-struct Row {
-    unknown: usize,
-    sources: Range<usize>,
-    lines: Range<usize>,
+struct Sum {
+    line: usize,
+    start: usize,
+}
+
+/// A line as the first of two, with those from itself on that blocks hold beside it.
+#[derive(Debug)]
+struct First {
+    line: usize,
+    sums: Range<usize>,
+    pairs: Range<usize>,
+    /// Memory of its sums.
+    len: usize,
 }
 
 /// Everything that assembling takes, memory included.
@@ -65,81 +76,81 @@ struct Row {
 pub(crate) struct Assembly {
     parts: Vec<Part>,
     lines: Vec<Line>,
-    rows: Vec<Row>,
-    sources: Vec<Source>,
-    /// The lines that each row reaches.
-    reached: Vec<usize>,
-    sums: Vec<f64>,
+    firsts: Vec<First>,
+    sums: Vec<Sum>,
+    pairs: Vec<Pair>,
+    memory: Vec<f64>,
     product: Vec<f64>,
 }
 
 impl Assembly {
     pub fn new(blocks: &[Block]) -> Self {
-        let factored: Vec<Option<&Factored>> = blocks
-            .iter()
-            .map(|block| match block {
-                Block::Dense(block) if !block.factored.is_empty() => Some(&block.factored),
-                _ => None,
-            })
-            .collect();
         let mut assembly = Self::default();
+        let mut rows: Vec<Vec<Row>> = Vec::new();
         let mut known: HashMap<&[usize], usize> = HashMap::new();
-        let mut sources: Vec<(usize, Source)> = Vec::new();
-        let mut lines_of: Vec<Vec<usize>> = Vec::new();
-        for (index, factored) in factored.iter().enumerate() {
-            let Some(factored) = factored else {
-                assembly.parts.push(Part::default());
-                lines_of.push(Vec::new());
-                continue;
+        let none = Factored::default();
+        for block in blocks {
+            let factored = match block {
+                Block::Dense(block) => &block.factored,
+                Block::Diagonal(_) => &none,
             };
-            let w = factored.columns();
-            let (mut targets, mut own) = (Vec::new(), Vec::new());
-            for group in factored.groups() {
-                let width = group.cols.next_multiple_of(PADDING);
-                let mut starts = Vec::with_capacity(group.rows);
-                let mut lasts = vec![Vec::with_capacity(group.rows); width / PADDING];
-                for positions in group.positions.chunks_exact(group.cols) {
-                    let lines = &mut assembly.lines;
+            let mut of_block = Vec::new();
+            for (index, group) in factored.groups().iter().enumerate() {
+                let &Group { u, v, cols, symmetric, .. } = group;
+                for (p, positions) in group.positions.chunks_exact(cols).enumerate() {
                     let line = *known.entry(positions).or_insert_with(|| {
-                        let start =
-                            lines.last().map_or(0, |l: &Line| l.start + l.positions.len().next_multiple_of(PADDING));
-                        lines.push(Line::new(positions, start));
-                        lines.len() - 1
+                        assembly.lines.push(Line::new(positions));
+                        assembly.lines.len() - 1
                     });
-                    starts.push(assembly.lines[line].start);
-                    for (lasts, positions) in lasts.iter_mut().zip(positions.chunks(PADDING)) {
-                        lasts.push(last(positions));
-                    }
-                    own.push(line);
+                    of_block.push(Row { line, group: index, u: u + p, v, weight: group.weight(), symmetric });
                 }
-                targets.push(Target { u: group.u, v: group.v, width, starts, lasts });
             }
-            for row in factored.rows() {
-                let g = &factored.groups()[row.group];
-                let places = row.entries.map(|(p, q)| ((g.u + p) * w, (g.v + q) * w));
-                sources.push((row.position, Source { part: index, places, count: row.count }));
-            }
-            let square = || vec![0.0; w * w + PADDING];
-            assembly.parts.push(Part { w, targets, wpw: square(), wzw: square() });
-            lines_of.push(own);
+            rows.push(of_block);
+            let w = factored.columns();
+            let longest = assembly.product.len().max(factored.size() * w);
+            assembly.product.resize(longest, 0.0);
+            assembly.parts.push(Part { w, wpw: vec![0.0; w * w], wzw: vec![0.0; w * w] });
         }
-        let longest = |of: &dyn Fn(&Factored) -> usize| factored.iter().flatten().map(|f| of(f)).max().unwrap_or(0);
-        assembly.product = vec![0.0; longest(&|f| f.size() * f.columns())];
-        assembly.sums = vec![0.0; assembly.lines.iter().map(|l| l.positions.len().next_multiple_of(PADDING)).sum()];
-        sources.sort_by_key(|(unknown, source)| (*unknown, source.part));
-        for group in sources.chunk_by(|a, b| a.0 == b.0) {
-            let unknown = group[0].0;
-            let mut lines: Vec<usize> = group.iter().flat_map(|(_, s)| lines_of[s.part].iter().copied()).collect();
-            lines.sort_unstable();
-            lines.dedup();
-            lines.retain(|&line| assembly.lines[line].last >= unknown);
-            let (first, reached) = (assembly.rows.last().map_or(0, |r| r.sources.end), assembly.reached.len());
-            assembly.reached.extend(lines);
-            let row = Row { unknown, sources: first..first + group.len(), lines: reached..assembly.reached.len() };
-            assembly.rows.push(row);
+        // Lines come in the order of their unknowns, so that most entries of a sum lie in the columns of the first line.
+        let mut order: Vec<usize> = (0..assembly.lines.len()).collect();
+        order.sort_by_key(|&line| assembly.lines[line].first());
+        let mut rank = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(place, &line)| rank[line] = place);
+        let mut holders: Vec<Vec<(usize, usize)>> = vec![Vec::new(); order.len()];
+        for (part, rows) in rows.iter().enumerate() {
+            rows.iter().enumerate().for_each(|(at, row)| holders[row.line].push((part, at)));
         }
-        assembly.sources = sources.into_iter().map(|(_, source)| source).collect();
+        for &line in &order {
+            assembly.add_first(line, &holders[line], &rows, &rank);
+        }
+        let most = assembly.firsts.iter().map(|first| first.len).max().unwrap_or(0);
+        assembly.memory = vec![0.0; most];
         assembly
+    }
+
+    /// A line with the rows that hold it, as (part, row).
+    fn add_first(&mut self, line: usize, holders: &[(usize, usize)], rows: &[Vec<Row>], rank: &[usize]) {
+        let later = |row: &&Row| rank[row.line] >= rank[line];
+        let beside = |&(part, _): &(usize, usize)| rows[part].iter().filter(later).map(|row| row.line);
+        let mut seconds: Vec<usize> = holders.iter().flat_map(beside).collect();
+        seconds.sort_unstable_by_key(|&second| rank[second]);
+        seconds.dedup();
+        let (sums, pairs) = (self.sums.len(), self.pairs.len());
+        let cols = self.lines[line].positions.len();
+        let mut len = 0;
+        for second in seconds {
+            self.sums.push(Sum { line: second, start: len });
+            len += cols * self.lines[second].width();
+        }
+        for &(part, at) in holders {
+            for row in rows[part].iter().filter(later) {
+                let place = self.sums[sums..].binary_search_by_key(&rank[row.line], |sum| rank[sum.line]);
+                // Every second line is among the sums.
+                let sum = self.sums[sums + place.unwrap_or_default()].start;
+                self.pairs.push(Pair { part, rows: [rows[part][at], *row], sum });
+            }
+        }
+        self.firsts.push(First { line, sums: sums..self.sums.len(), pairs: pairs..self.pairs.len(), len });
     }
 
     /// Takes over P and Z of one block.
@@ -149,112 +160,159 @@ impl Assembly {
         factored.project(z, &mut self.product, &mut part.wzw);
     }
 
-    /// M ← M + Σ tr(F_i P F_j Z) over the blocks taken over, lower triangle (j ≤ i stored at `m[i + j·N]`).
+    /// Adds the sum over all blocks of tr(F_i P F_j Z) to M, lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
     pub fn add(&mut self, m: &mut [f64], unknowns: usize) {
-        pulp::Arch::new().dispatch(Rows { assembly: self, m, unknowns });
+        pulp::Arch::new().dispatch(Sums { assembly: self, m, unknowns });
     }
 }
 
 impl Line {
-    fn new(positions: &[usize], start: usize) -> Self {
+    fn new(positions: &[usize]) -> Self {
         let first = positions[0];
-        let runs = first != NO_UNKNOWN && positions.iter().enumerate().all(|(s, &at)| at == first + s);
-        Self { positions: positions.to_vec(), run: runs.then_some(first), last: last(positions), start }
+        let runs = |(s, at): &(usize, &usize)| first != NO_UNKNOWN && **at == first + s;
+        let run = positions.iter().enumerate().take_while(runs).count();
+        Self { positions: positions.to_vec(), run }
     }
 
-    /// Adds the entries of the sum from `unknown` on to a row of the Schur complement.
+    /// The first unknown.
+    fn first(&self) -> usize {
+        self.positions.iter().copied().min().unwrap_or(NO_UNKNOWN)
+    }
+
+    /// Places in whole vectors.
+    fn width(&self) -> usize {
+        self.positions.len().next_multiple_of(PADDING)
+    }
+
+    /// Adds entries of one unknown with those of the line, which is another than that of the unknown.
     #[inline(always)]
-    fn spread(&self, sum: &[f64], unknown: usize, target: &mut [f64]) {
-        if let Some(first) = self.run {
-            let skip = unknown.saturating_sub(first);
-            let end = first + self.positions.len();
-            axpy(1.0, &sum[skip..self.positions.len()], &mut target[first + skip..end]);
-            return;
-        }
-        for (&at, value) in self.positions.iter().zip(sum) {
-            if at >= unknown && at != NO_UNKNOWN {
-                target[at] += value;
+    fn spread(&self, unknown: usize, entries: &[f64], m: &mut [f64], n: usize) {
+        let (run, scattered) = entries.split_at(self.run);
+        if self.run > 0 {
+            let first = self.positions[0];
+            let before = unknown.saturating_sub(first).min(self.run);
+            for (s, value) in run[..before].iter().enumerate() {
+                m[(first + s) * n + unknown] += value;
+            }
+            let column = unknown * n + first;
+            axpy(1.0, &run[before..], &mut m[column + before..column + self.run]);
+            if (first..first + self.run).contains(&unknown) {
+                // The unknown has a place in both lines, and each is the first of a pair.
+                m[unknown * n + unknown] += run[before];
             }
         }
+        for (&at, value) in self.positions[self.run..].iter().zip(scattered).filter(|(at, _)| **at != NO_UNKNOWN) {
+            let value = if at == unknown { 2.0 * value } else { *value };
+            m[at.min(unknown) * n + at.max(unknown)] += value;
+        }
     }
 }
 
-/// The last unknown.
-fn last(positions: &[usize]) -> usize {
-    positions.iter().copied().filter(|&at| at != NO_UNKNOWN).max().unwrap_or(0)
-}
-
-/// All rows.
-struct Rows<'a> {
+/// All sums, one first line after the other.
+struct Sums<'a> {
     assembly: &'a mut Assembly,
     m: &'a mut [f64],
     unknowns: usize,
 }
 
-impl pulp::WithSimd for Rows<'_> {
+impl pulp::WithSimd for Sums<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let Assembly { parts, lines, rows, sources, reached, sums, .. } = self.assembly;
-        for row in rows.iter() {
-            let reached = &reached[row.lines.clone()];
-            for &line in reached {
-                let line = &lines[line];
-                sums[line.start..line.start + line.positions.len().next_multiple_of(PADDING)].fill(0.0);
+        let Self { assembly: Assembly { parts, lines, firsts, sums, pairs, memory, .. }, m, unknowns: n } = self;
+        for first in firsts.iter() {
+            let memory = &mut memory[..first.len];
+            memory.fill(0.0);
+            let positions = &lines[first.line].positions[..];
+            for Pair { part, rows, sum } in &pairs[first.pairs.clone()] {
+                let width = lines[rows[1].line].width();
+                let sum = &mut memory[*sum..*sum + positions.len() * width];
+                add_pair(simd, &parts[*part], *rows, width, sum);
             }
-            for source in &sources[row.sources.clone()] {
-                let Part { w, targets, wpw, wzw } = &parts[source.part];
-                // (v_qᵀPu_r)(v_sᵀZu_p) + (v_qᵀPv_s)(u_rᵀZu_p) + (u_pᵀPu_r)(v_sᵀZv_q) + (u_pᵀPv_s)(u_rᵀZv_q)
-                let line = |of: &'_ [f64], at: usize| -> Range<usize> { at..(at + w + PADDING).min(of.len()) };
-                let terms = |(u, v): (usize, usize)| {
-                    let [pu, pv] = [u, v].map(|at| &wpw[line(wpw, at)]);
-                    let [zu, zv] = [u, v].map(|at| &wzw[line(wzw, at)]);
-                    [(pv, zu), (zu, pv), (pu, zv), (zv, pu)]
-                };
-                let first = terms(source.places[0]);
-                if source.count == 1 {
-                    targets.iter().for_each(|target| outer_products(simd, target, row.unknown, first, sums));
-                } else {
-                    let [a, b, c, d] = first;
-                    let [e, f, g, h] = terms(source.places[1]);
-                    let all = [a, b, c, d, e, f, g, h];
-                    targets.iter().for_each(|target| outer_products(simd, target, row.unknown, all, sums));
+            for Sum { line, start } in &sums[first.sums.clone()] {
+                let second = &lines[*line];
+                let rows = memory[*start..].chunks_exact(second.width()).zip(positions).enumerate();
+                for (q, (entries, &unknown)) in rows.filter(|(_, (_, unknown))| **unknown != NO_UNKNOWN) {
+                    if *line != first.line {
+                        second.spread(unknown, &entries[..second.positions.len()], m, n);
+                        continue;
+                    }
+                    // The sum of a line with itself is symmetric: one half of it, and the diagonal once.
+                    m[unknown * n + unknown] += entries[q];
+                    for (&at, value) in positions[..q].iter().zip(entries).filter(|(at, _)| **at != NO_UNKNOWN) {
+                        let value = if at == unknown { 2.0 * value } else { *value };
+                        m[at.min(unknown) * n + at.max(unknown)] += value;
+                    }
                 }
-            }
-            let target = &mut self.m[row.unknown * self.unknowns..(row.unknown + 1) * self.unknowns];
-            for &line in reached {
-                let line = &lines[line];
-                line.spread(&sums[line.start..], row.unknown, target);
             }
         }
     }
 }
 
-/// sums ← sums + Σ_k left_k[u + r] · right_k[v..] for every row r with unknowns from `unknown` on. Rows come with falling last
-/// unknowns; where their columns do not, a little too much is computed.
+/// What one block adds to the sum of two lines, row by row with rows of `width`.
 #[inline(always)]
-fn outer_products<S: pulp::Simd, const K: usize>(
-    simd: S,
-    target: &Target,
-    unknown: usize,
-    terms: [(&[f64], &[f64]); K],
-    sums: &mut [f64],
-) {
-    let rows = target.starts.len();
-    let lefts = terms.map(|(left, _)| &left[target.u..target.u + rows]);
-    let rights = terms.map(|(_, right)| S::as_simd_f64s(&right[target.v..target.v + target.width]).0);
-    for c in 0..target.width / S::F64_LANES {
-        let lasts = &target.lasts[c * S::F64_LANES / PADDING];
-        let rows = rows - lasts.iter().rev().take_while(|&&last| last < unknown).count();
-        let right: [S::f64s; K] = std::array::from_fn(|k| rights[k][c]);
-        for (r, &start) in target.starts[..rows].iter().enumerate() {
-            let (sum, _) = S::as_mut_simd_f64s(&mut sums[start + c * S::F64_LANES..start + (c + 1) * S::F64_LANES]);
-            let mut total = sum[0];
-            for k in 0..K {
-                total = simd.mul_add_e_f64s(simd.splat_f64s(lefts[k][r]), right[k], total);
+fn add_pair<S: pulp::Simd>(simd: S, part: &Part, [p, r]: [Row; 2], width: usize, sum: &mut [f64]) {
+    let Part { w, wpw, wzw } = part;
+    let row = |of: &'_ [f64], u: usize| -> Range<usize> { u * w..(u * w + w).min(of.len()) };
+    let (pu, zu) = (&wpw[row(wpw, p.u)], &wzw[row(wzw, p.u)]);
+    let (pr, zr) = (&wpw[row(wpw, r.u)], &wzw[row(wzw, r.u)]);
+    let pair = Projected { p, r, stride: w / S::F64_LANES, part: [wpw, wzw], first: [pu, zu], second: [pr, zr] };
+    let vectors = width / S::F64_LANES;
+    for first in (0..vectors).step_by(4) {
+        match vectors - first {
+            1 => pair.add::<S, 1>(simd, first, vectors, sum),
+            2 => pair.add::<S, 2>(simd, first, vectors, sum),
+            3 => pair.add::<S, 3>(simd, first, vectors, sum),
+            _ => pair.add::<S, 4>(simd, first, vectors, sum),
+        }
+    }
+}
+
+/// Two rows with `WᵀPW` and `WᵀZW`, whole and for their columns of U. Rows of W begin with whole vectors.
+struct Projected<'a> {
+    p: Row,
+    r: Row,
+    /// Vectors in a row.
+    stride: usize,
+    part: [&'a [f64]; 2],
+    first: [&'a [f64]; 2],
+    second: [&'a [f64]; 2],
+}
+
+impl Projected<'_> {
+    /// N vectors of every row of the sum, from vector `first` on.
+    #[inline(always)]
+    fn add<S: pulp::Simd, const N: usize>(&self, simd: S, first: usize, vectors: usize, sum: &mut [f64]) {
+        let Self { p, r, stride, part, .. } = self;
+        let weight = p.weight * r.weight;
+        let (sum, _) = S::as_mut_simd_f64s(sum);
+        let at = r.v / S::F64_LANES + first;
+        let rows = |of: usize| S::as_simd_f64s(&part[of][p.v * stride * S::F64_LANES..]).0.chunks_exact(*stride);
+        let sums = sum.chunks_exact_mut(vectors).map(|row| &mut row[first..first + N]);
+        if p.symmetric && p.group == r.group {
+            let factor = simd.splat_f64s(self.first[0][r.u]);
+            for (sum, z) in sums.zip(rows(1)) {
+                for (sum, z) in sum.iter_mut().zip(&z[at..at + N]) {
+                    *sum = simd.mul_add_e_f64s(factor, *z, *sum);
+                }
             }
-            sum[0] = total;
+            return;
+        }
+        let [of_p, of_z] = [self.first[0][r.u], self.first[1][r.u]].map(|entry| simd.splat_f64s(weight * entry));
+        let vector = |of: usize| -> [S::f64s; N] {
+            let row = &S::as_simd_f64s(self.first[of]).0[at..at + N];
+            std::array::from_fn(|k| simd.mul_f64s(simd.splat_f64s(weight), row[k]))
+        };
+        let (pv, zv) = (vector(0), vector(1));
+        let (left_p, left_z) = (&self.second[0][p.v..], &self.second[1][p.v..]);
+        for ((sum, (vpv, vzv)), (a, b)) in sums.zip(rows(0).zip(rows(1))).zip(left_p.iter().zip(left_z)) {
+            let (a, b) = (simd.splat_f64s(*a), simd.splat_f64s(*b));
+            let (vpv, vzv) = (&vpv[at..at + N], &vzv[at..at + N]);
+            for k in 0..N {
+                let rank_two = simd.mul_add_e_f64s(a, zv[k], simd.mul_add_e_f64s(b, pv[k], sum[k]));
+                sum[k] = simd.mul_add_e_f64s(of_z, vpv[k], simd.mul_add_e_f64s(of_p, vzv[k], rank_two));
+            }
         }
     }
 }

@@ -68,29 +68,7 @@ pub(crate) fn cholesky(n: usize, a: &mut [f64], scratch: &mut Scratch) -> bool {
         );
         return done.is_ok() && (0..n).all(|j| a[j + j * n].is_finite() && a[j + j * n] > 0.0);
     }
-    cholesky_by_columns(n, a)
-}
-
-vectorized! {
-    fn cholesky_by_columns<'a>(n: usize, a: &'a mut [f64]) -> bool {
-        for j in 0..n {
-            let (head, tail) = a.split_at_mut((j + 1) * n);
-            let column = &mut head[j * n..];
-            let pivot = column[j];
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return false;
-            }
-            let inverse = 1.0 / pivot.sqrt();
-            for entry in &mut column[j..] {
-                *entry *= inverse;
-            }
-            for (k, target) in tail.chunks_exact_mut(n).enumerate() {
-                let k = j + 1 + k;
-                axpy(-column[k], &column[k..], &mut target[k..]);
-            }
-        }
-        true
-    }
+    n == 0 || small::cholesky(n, a, &mut scratch.padded)
 }
 
 /// (L Lᵀ)⁻¹ as a full symmetric matrix, from the lower triangle L.
@@ -109,18 +87,39 @@ pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], scratch:
     small::inverse_from_factor(n, l, out, &mut scratch.padded);
 }
 
+/// Columns that a triangular solve takes at once.
+const PANEL: usize = 4;
+
 vectorized! {
     /// x ← (L Lᵀ)⁻¹ x for the lower triangle L.
     pub(crate) fn solve_with_factor<'a>(n: usize, l: &'a [f64], x: &'a mut [f64]) {
-        for j in 0..n {
-            let column = &l[j * n + j..(j + 1) * n];
-            let value = x[j] / column[0];
-            x[j] = value;
-            axpy(-value, &column[1..], &mut x[j + 1..n]);
+        for first in (0..n).step_by(PANEL) {
+            let end = (first + PANEL).min(n);
+            for j in first..end {
+                let known: f64 = (first..j).map(|k| l[j + k * n] * x[k]).sum();
+                x[j] = (x[j] - known) / l[j + j * n];
+            }
+            if end < n {
+                let (known, rest) = x.split_at_mut(end);
+                let columns: [&[f64]; PANEL] = std::array::from_fn(|k| &l[(first + k) * n + end..(first + k + 1) * n]);
+                let factors: [f64; PANEL] = std::array::from_fn(|k| known[first + k]);
+                for (i, x) in rest.iter_mut().enumerate() {
+                    *x -= (0..PANEL).map(|k| factors[k] * columns[k][i]).sum::<f64>();
+                }
+            }
         }
-        for j in (0..n).rev() {
-            let column = &l[j * n + j..(j + 1) * n];
-            x[j] = (x[j] - dot(&column[1..], &x[j + 1..n])) / column[0];
+        for first in (0..n).step_by(PANEL).rev() {
+            let end = (first + PANEL).min(n);
+            if end < n {
+                let (unknown, known) = x.split_at_mut(end);
+                for (k, x) in unknown[first..].iter_mut().enumerate() {
+                    *x -= dot(&l[(first + k) * n + end..(first + k + 1) * n], known);
+                }
+            }
+            for j in (first..end).rev() {
+                let known: f64 = (j + 1..end).map(|k| l[k + j * n] * x[k]).sum();
+                x[j] = (x[j] - known) / l[j + j * n];
+            }
         }
     }
 }

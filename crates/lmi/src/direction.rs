@@ -234,8 +234,8 @@ impl BlockState {
 
     /// ⟨S + α dS, Z + β dZ⟩.
     pub fn complementarity(&self, alpha: f64, beta: f64) -> f64 {
-        let at = |i: usize| (self.s[i] + alpha * self.ds[i]) * (self.z[i] + beta * self.dz[i]);
-        (0..self.s.len()).map(at).sum()
+        let Self { s, z, ds, dz, .. } = self;
+        dense::dot(s, z) + alpha * dense::dot(ds, z) + beta * dense::dot(s, dz) + alpha * beta * dense::dot(ds, dz)
     }
 
     /// Whether S + α dS is positive definite; its factor replaces that of S.

@@ -7,12 +7,15 @@
 //! tr(F_pq P F_rs Z) = (v_qᵀPu_r)(v_sᵀZu_p) + (v_qᵀPv_s)(u_rᵀZu_p) + (u_pᵀPu_r)(v_sᵀZv_q) + (u_pᵀPv_s)(u_rᵀZv_q),
 //! ```
 //!
-//! entries of the small matrices `WᵀPW` and `WᵀZW`, W = [U V]: one row of the Schur complement is a sum of four outer products,
-//! whatever the size of the block.
+//! entries of the small matrices `WᵀPW` and `WᵀZW`, W = [U V]: for two rows p and r of stacks and all q and s together the sum of two
+//! matrices of rank one and of multiples of `VᵀPV` and `VᵀZV`, whatever the size of the block.
+//!
+//! Of `V X Vᵀ` with a symmetric X (U = ½V: the unknown itself in a corner of the block, or a congruence of it) the entries (p, q) and
+//! (q, p) are one unknown, and so are (r, s) and (s, r). Summed over these four pairs the terms are the same, so that the third
+//! alone, `(v_pᵀPv_r)(v_qᵀZv_s)`, does for all.
 
 use crate::dense::axpy;
 use crate::vectorized::vectorized;
-use std::collections::HashMap;
 
 /// In place of a scalar unknown where a stack has a zero.
 pub(crate) const NO_UNKNOWN: usize = usize::MAX;
@@ -28,15 +31,31 @@ pub(crate) struct Stack {
 
 impl Stack {
     /// Rows in the order of their last unknowns, falling: those that a row of the lower triangle of M does not reach come last.
-    fn by_last_unknown(self) -> Self {
+    fn by_last_unknown(&self) -> Self {
         let cols = self.v.len();
         let row = |r: usize| &self.positions[r * cols..(r + 1) * cols];
         let last = |r: usize| row(r).iter().copied().filter(|&at| at != NO_UNKNOWN).max();
         let mut order: Vec<usize> = (0..self.u.len()).collect();
         order.sort_by_key(|&r| std::cmp::Reverse(last(r)));
-        let u = order.iter().map(|&r| self.u[r].clone()).collect();
-        let positions = order.iter().flat_map(|&r| row(r).iter().copied()).collect();
-        Self { u, v: self.v, positions }
+        self.of_rows(&order)
+    }
+
+    /// The row of U that is half of each column of V, where there is one for each and X is symmetric between them.
+    fn mirrored(&self) -> Option<Vec<usize>> {
+        let cols = self.v.len();
+        let half = |u: &[f64], v: &[f64]| u.iter().zip(v).all(|(u, v)| *u == 0.5 * v);
+        let row = |v: &Vec<f64>| self.u.iter().position(|u| half(u, v));
+        let rows: Vec<usize> = self.v.iter().map(row).collect::<Option<_>>()?;
+        let position = |s: usize, t: usize| self.positions[rows[s] * cols + t];
+        (0..cols).all(|s| (0..s).all(|t| rows[s] != rows[t] && position(s, t) == position(t, s))).then_some(rows)
+    }
+
+    /// The stack of some of the rows.
+    fn of_rows(&self, rows: &[usize]) -> Self {
+        let cols = self.v.len();
+        let u = rows.iter().map(|&r| self.u[r].clone()).collect();
+        let positions = rows.iter().flat_map(|&r| self.positions[r * cols..(r + 1) * cols].iter().copied()).collect();
+        Self { u, v: self.v.clone(), positions }
     }
 }
 
@@ -56,6 +75,14 @@ impl Columns {
         self.starts.push(self.entries.len());
     }
 
+    /// Adds columns, and empty ones up to a multiple of [`PADDING`]; gives the place of the first one.
+    fn push_whole_vectors(&mut self, columns: &[Vec<f64>]) -> usize {
+        let first = self.len();
+        columns.iter().for_each(|column| self.push(column));
+        (columns.len()..columns.len().next_multiple_of(PADDING)).for_each(|_| self.push(&[]));
+        first
+    }
+
     fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
@@ -65,7 +92,7 @@ impl Columns {
     }
 }
 
-/// A stack: U is columns `u..u + rows` of W, V is columns `v..v + cols`.
+/// A stack: U is columns `u..u + rows` of W, V is columns `v..v + cols`; of a symmetric one U is half of V.
 #[derive(Debug)]
 pub(crate) struct Group {
     pub u: usize,
@@ -73,16 +100,18 @@ pub(crate) struct Group {
     pub v: usize,
     pub cols: usize,
     pub positions: Vec<usize>,
+    pub symmetric: bool,
 }
 
-/// A row of the Schur complement that a group contributes to: the entries of X that are one scalar unknown
-/// (two for a symmetric unknown off the diagonal).
-#[derive(Debug)]
-pub(crate) struct Row {
-    pub position: usize,
-    pub group: usize,
-    pub entries: [(usize, usize); 2],
-    pub count: usize,
+impl Group {
+    fn new(u: usize, v: usize, stack: Stack, symmetric: bool) -> Self {
+        Self { u, rows: stack.u.len(), v, cols: stack.v.len(), positions: stack.positions, symmetric }
+    }
+
+    /// What the columns of W that are taken for U are multiplied by.
+    pub fn weight(&self) -> f64 {
+        if self.symmetric { 0.5 } else { 1.0 }
+    }
 }
 
 /// The factored part of a block.
@@ -91,7 +120,6 @@ pub(crate) struct Factored {
     n: usize,
     w: Columns,
     groups: Vec<Group>,
-    rows: Vec<Row>,
 }
 
 /// Rows are padded to a multiple of this, at least the widest vector register.
@@ -107,32 +135,23 @@ impl Factored {
     pub fn new(n: usize, stacks: Vec<Stack>) -> Self {
         let mut w = Columns::default();
         let mut groups = Vec::new();
-        let mut rows: Vec<Row> = Vec::new();
-        for stack in stacks.into_iter().map(Stack::by_last_unknown) {
-            let (u, count) = (w.len(), stack.u.len());
-            stack.u.iter().for_each(|column| w.push(column));
-            let (v, cols) = (w.len(), stack.v.len());
-            stack.v.iter().for_each(|column| w.push(column));
-            let mut seen: HashMap<usize, usize> = HashMap::new();
-            for (at, &position) in stack.positions.iter().enumerate() {
-                if position == NO_UNKNOWN {
-                    continue;
-                }
-                let entry = (at / cols, at % cols);
-                match seen.get(&position) {
-                    Some(&row) if rows[row].count == 1 => {
-                        rows[row].entries[1] = entry;
-                        rows[row].count = 2;
-                    }
-                    _ => {
-                        seen.insert(position, rows.len());
-                        rows.push(Row { position, group: groups.len(), entries: [entry; 2], count: 1 });
-                    }
-                }
+        for stack in &stacks {
+            let mut v = None;
+            let mut columns_of_v = |w: &mut Columns| *v.get_or_insert_with(|| w.push_whole_vectors(&stack.v));
+            let mirrored = stack.mirrored();
+            if let Some(rows_of_v) = &mirrored {
+                let v = columns_of_v(&mut w);
+                groups.push(Group::new(v, v, stack.of_rows(rows_of_v), true));
             }
-            groups.push(Group { u, rows: count, v, cols, positions: stack.positions });
+            let left = |r: &usize| mirrored.as_ref().is_none_or(|rows| !rows.contains(r));
+            let rest: Vec<usize> = (0..stack.u.len()).filter(left).collect();
+            if !rest.is_empty() {
+                let rest = stack.of_rows(&rest).by_last_unknown();
+                let v = columns_of_v(&mut w);
+                groups.push(Group::new(w.push_whole_vectors(&rest.u), v, rest, false));
+            }
         }
-        Self { n, w, groups, rows }
+        Self { n, w, groups }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -143,12 +162,11 @@ impl Factored {
     pub fn cost(&self) -> usize {
         let (n, w, filled) = (self.n, self.w.len(), self.w.entries.len());
         let projection = filled * n / 6 + filled * w / 2;
-        let padded = |g: &Group| g.cols.next_multiple_of(PADDING);
-        // Each row reaches half of the others on average.
-        let products: usize = self.groups.iter().map(|g| g.rows * padded(g)).sum();
-        let gathered: usize = self.groups.iter().map(|g| g.rows + padded(g)).sum();
-        let terms: usize = self.rows.iter().map(|row| 4 * row.count).sum();
-        2 * projection + terms * (products / 12 + gathered / 4) + self.rows.len() * products / 6
+        let entries: usize = self.groups.iter().map(|g| g.rows * g.cols.next_multiple_of(PADDING)).sum();
+        let entries_of_symmetric = |g: &Group| if g.symmetric { g.rows * g.cols } else { 0 };
+        let easy: usize = self.groups.iter().map(|g| entries_of_symmetric(g).pow(2)).sum();
+        // Half of all pairs of entries: their products, and the spreading of the sums, which is shared with other blocks.
+        2 * projection + (4 * entries.pow(2) - 3 * easy) / 12 + entries.pow(2) / 8
     }
 
     pub fn scratch(&self) -> FactoredScratch {
@@ -170,11 +188,7 @@ impl Factored {
         &self.groups
     }
 
-    pub fn rows(&self) -> &[Row] {
-        &self.rows
-    }
-
-    /// WᵀHW for symmetric H, row by row.
+    /// WᵀHW for symmetric H, row by row; what belongs to empty columns is left as it is.
     pub fn project(&self, h: &[f64], product: &mut [f64], out: &mut [f64]) {
         project(self.n, &self.w, h, &mut product[..self.n * self.w.len()], out);
     }
@@ -199,7 +213,7 @@ impl Factored {
             for (at, &position) in group.positions.iter().enumerate().filter(|(_, at)| **at != NO_UNKNOWN) {
                 for &(i, u) in self.w.column(group.u + at / group.cols) {
                     for &(j, v) in self.w.column(group.v + at % group.cols) {
-                        visit(i.max(j), i.min(j), Some(position), u * v);
+                        visit(i.max(j), i.min(j), Some(position), group.weight() * u * v);
                     }
                 }
             }
@@ -218,7 +232,7 @@ impl Factored {
         for group in &self.groups {
             for r in 0..group.rows {
                 for s in (0..group.cols).filter(|s| group.positions[r * group.cols + s] != NO_UNKNOWN) {
-                    let norm = 2.0_f64.sqrt() * lengths[group.u + r] * lengths[group.v + s];
+                    let norm = 2.0_f64.sqrt() * group.weight() * lengths[group.u + r] * lengths[group.v + s];
                     let out = &mut out[group.positions[r * group.cols + s]];
                     *out = out.max(norm);
                 }
@@ -241,6 +255,7 @@ vectorized! {
         t.fill(0.0);
         for r in 0..group.rows {
             for &(i, value) in w.column(group.u + r) {
+                let value = group.weight() * value;
                 let positions = &group.positions[r * group.cols..(r + 1) * group.cols];
                 for (s, position) in positions.iter().enumerate() {
                     if *position != NO_UNKNOWN {
@@ -275,7 +290,7 @@ vectorized! {
         for s in 0..group.cols {
             hv.fill(0.0);
             for &(i, value) in w.column(group.v + s) {
-                axpy(2.0 * factor * value, &h[i * n..(i + 1) * n], hv);
+                axpy(2.0 * factor * group.weight() * value, &h[i * n..(i + 1) * n], hv);
             }
             for r in 0..group.rows {
                 let at = group.positions[r * group.cols + s];
@@ -293,7 +308,7 @@ vectorized! {
     /// WᵀHW for symmetric H.
     fn project<'a>(n: usize, w: &'a Columns, h: &'a [f64], product: &'a mut [f64], out: &'a mut [f64]) {
         let count = w.len();
-        for (j, hw) in product.chunks_exact_mut(n).enumerate() {
+        for (j, hw) in product.chunks_exact_mut(n).enumerate().filter(|(j, _)| !w.column(*j).is_empty()) {
             hw.fill(0.0);
             for &(i, value) in w.column(j) {
                 axpy(value, &h[i * n..(i + 1) * n], hw);

@@ -386,7 +386,7 @@ impl<'a> Iteration<'a> {
     /// One predictor-corrector step: (centring, primal step, dual step), or `None` when no step can be taken.
     fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
         let unknowns = self.x.len();
-        self.schur.matrix.fill(0.0);
+        self.schur.clear();
         for (index, (state, block)) in self.blocks.iter_mut().zip(self.operators).enumerate() {
             state.invert(&mut self.scratch);
             let BlockState { s_inverse, z, operator, .. } = state;

@@ -9,6 +9,9 @@ use crate::dense::{apply, axpy, dot};
 /// Most steps of one estimate. The result is safe-guarded by a Cholesky factorisation, so that few suffice.
 const STEPS: usize = 30;
 
+/// From this accuracy on an estimate may end after two steps.
+const COARSE: f64 = 0.1;
+
 /// Scratch memory for matrices up to a size.
 #[derive(Debug)]
 pub(crate) struct Lanczos {
@@ -63,6 +66,8 @@ impl pulp::WithSimd for LongestStep<'_> {
         sv_before.fill(0.0);
         let (mut alphas, mut betas) = ([0.0; STEPS], [0.0; STEPS]);
         let mut smallest = f64::NAN;
+        // Where little is asked for little may do.
+        let first = if accuracy < COARSE { 3 } else { 1 };
         for k in 0..STEPS.min(n) {
             apply(simd, n, d, v, w);
             if k > 0 {
@@ -79,8 +84,8 @@ impl pulp::WithSimd for LongestStep<'_> {
             alphas[k] = alpha;
             betas[k] = beta;
             let last = k + 1 == STEPS.min(n) || beta <= 1e-12 * alphas[0].abs();
-            if last || (k >= 3 && k % 2 == 1) {
-                let (value, component) = smallest_of_tridiagonal(&alphas[..=k], &betas[..k]);
+            if last || (k >= first && k % 2 == 1) {
+                let (value, component) = smallest_of_tridiagonal(&alphas[..=k], &betas[..k], 0.02 * accuracy);
                 // Some eigenvalue lies within `residual` of the Ritz value.
                 let residual = if k + 1 == n { 0.0 } else { beta * component };
                 smallest = value - residual;
@@ -97,9 +102,9 @@ impl pulp::WithSimd for LongestStep<'_> {
     }
 }
 
-/// The smallest eigenvalue of a symmetric tridiagonal matrix to about 1e-4 of its spread, and the last component (absolute) of its
-/// normalised eigenvector.
-fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> (f64, f64) {
+/// The smallest eigenvalue of a symmetric tridiagonal matrix from below, to the relative `accuracy`, and the last component (absolute)
+/// of its normalised eigenvector.
+fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64], accuracy: f64) -> (f64, f64) {
     let k = diagonal.len();
     let radius = |i: usize| {
         let left = if i > 0 { off[i - 1].abs() } else { 0.0 };
@@ -108,19 +113,21 @@ fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64]) -> (f64, f64) {
     };
     let mut low = (0..k).map(|i| diagonal[i] - radius(i)).fold(f64::INFINITY, f64::min);
     let mut high = diagonal.iter().copied().fold(f64::INFINITY, f64::min);
-    // Sturm: the pivots of T − λI are all positive exactly when λ is below the spectrum.
+    let spread = (0..k).map(|i| (diagonal[i] - low).abs() + radius(i)).fold(f64::MIN_POSITIVE, f64::max);
+    let unit = 1.0 / spread;
+    // Sturm: the leading minors of T − λI, here of its multiple by `unit`, are all positive exactly when λ is below the spectrum.
     let below = |lambda: f64| {
-        let mut pivot = diagonal[0] - lambda;
+        let (mut before, mut minor) = (1.0, unit * (diagonal[0] - lambda));
+        let mut positive = minor > 0.0;
         for i in 1..k {
-            if pivot <= 0.0 {
-                return false;
-            }
-            pivot = diagonal[i] - lambda - off[i - 1] * off[i - 1] / pivot;
+            let next = unit * (diagonal[i] - lambda) * minor - (unit * off[i - 1]).powi(2) * before;
+            (before, minor) = (minor, next);
+            positive &= minor > 0.0;
         }
-        pivot > 0.0
+        positive
     };
     for _ in 0..40 {
-        if high - low <= 1e-3 * low.abs().max(high.abs()) {
+        if high - low <= accuracy * low.abs().max(high.abs()) {
             break;
         }
         let middle = 0.5 * (low + high);
@@ -194,7 +201,7 @@ mod tests {
 
     #[test]
     fn smallest_eigenvalue_of_a_second_difference() {
-        let (value, component) = smallest_of_tridiagonal(&[2.0; 5], &[-1.0; 4]);
+        let (value, component) = smallest_of_tridiagonal(&[2.0; 5], &[-1.0; 4], 1e-3);
         let exact = 2.0 - 2.0 * (std::f64::consts::PI / 6.0).cos();
         assert!((value - exact).abs() < 1e-3 && value <= exact);
         // The eigenvector is sin(kπ/6)/√3.

@@ -36,9 +36,18 @@ impl Schur {
         }
     }
 
+    /// The lower triangle of M ← 0; the upper one is not looked at.
+    pub fn clear(&mut self) {
+        let n = self.n;
+        (0..n).for_each(|j| self.matrix[j * n + j..(j + 1) * n].fill(0.0));
+    }
+
     /// M ← diag(s) M diag(s).
     pub fn scale_by(&mut self, s: &[f64]) {
         let n = self.n;
+        if s.iter().all(|s| *s == 1.0) {
+            return;
+        }
         for j in 0..n {
             self.matrix[j * n + j..(j + 1) * n].iter_mut().zip(&s[j..]).for_each(|(m, i)| *m *= i * s[j]);
         }
@@ -64,14 +73,7 @@ impl Schur {
         }
         self.regularization = regularization;
         loop {
-            for j in 0..n {
-                let scale = self.scale[j];
-                let columns = self.factor[j * n + j..(j + 1) * n].iter_mut().zip(&self.matrix[j * n + j..(j + 1) * n]);
-                for ((factor, entry), other) in columns.zip(&self.scale[j..]) {
-                    *factor = entry * scale * other;
-                }
-                self.factor[j + j * n] = 1.0 + self.regularization;
-            }
+            scaled(n, &self.matrix, &self.scale, 1.0 + self.regularization, &mut self.factor);
             if cholesky(n, &mut self.factor, &mut self.scratch) {
                 return true;
             }
@@ -125,6 +127,18 @@ impl Schur {
     /// residual = r − M x from the lower triangle.
     fn update_residual(&mut self, r: &[f64], x: &[f64]) {
         subtract_product(self.n, &self.matrix, r, x, &mut self.residual);
+    }
+}
+
+vectorized! {
+    /// out = diag(s) M diag(s) for the lower triangle of a symmetric M, with another diagonal.
+    fn scaled<'a>(n: usize, m: &'a [f64], s: &'a [f64], diagonal: f64, out: &'a mut [f64]) {
+        for (j, (out, column)) in out.chunks_exact_mut(n.max(1)).zip(m.chunks_exact(n.max(1))).enumerate() {
+            for ((out, entry), other) in out[j..].iter_mut().zip(&column[j..]).zip(&s[j..]) {
+                *out = entry * s[j] * other;
+            }
+            out[j] = diagonal;
+        }
     }
 }
 

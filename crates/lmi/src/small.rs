@@ -21,6 +21,24 @@ pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], padded: 
     pulp::Arch::new().dispatch(Inverse { n, l, out, padded });
 }
 
+/// Replaces the lower triangle of `a` by its Cholesky factor. False when `a` is not positive definite (or not finite).
+pub(crate) fn cholesky(n: usize, a: &mut [f64], padded: &mut [f64]) -> bool {
+    pulp::Arch::new().dispatch(Cholesky { n, a, padded })
+}
+
+/// Calls a method with the number of vectors in a column known to the compiler, so that they stay in registers.
+macro_rules! with_height {
+    ($kernel:expr, $simd:expr, $set:ident) => {
+        with_height!($kernel, $simd, $set, 1 2 3 4 5 6 8 10)
+    };
+    ($kernel:expr, $simd:expr, $set:ident, $($known:literal)*) => {
+        match $kernel.n.next_multiple_of(PADDING) / $set::F64_LANES {
+            $($known => $kernel.with_height::<$set, $known>($simd),)*
+            _ => $kernel.with_height::<$set, MOST>($simd),
+        }
+    };
+}
+
 struct Multiply<'a> {
     n: usize,
     a: &'a [f64],
@@ -135,16 +153,7 @@ impl pulp::WithSimd for Inverse<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
-        // The number of vectors in a column is known to the compiler, so that they stay in registers.
-        macro_rules! by_height {
-            ($height:expr, $($known:literal)*) => {
-                match $height {
-                    $($known => self.with_height::<S, $known>(simd),)*
-                    _ => self.with_height::<S, MOST>(simd),
-                }
-            };
-        }
-        by_height!(self.n.next_multiple_of(PADDING) / S::F64_LANES, 1 2 3 4 5 6 8 10);
+        with_height!(self, simd, S)
     }
 }
 
@@ -191,5 +200,60 @@ impl Inverse<'_> {
             }
             column += 2;
         }
+    }
+}
+
+struct Cholesky<'a> {
+    n: usize,
+    a: &'a mut [f64],
+    padded: &'a mut [f64],
+}
+
+impl pulp::WithSimd for Cholesky<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> bool {
+        with_height!(self, simd, S)
+    }
+}
+
+impl Cholesky<'_> {
+    /// For columns of at most H vectors: each column less its part in those before, whole columns at a time.
+    #[inline(always)]
+    fn with_height<S: pulp::Simd, const H: usize>(self, simd: S) -> bool {
+        let Self { n, a, padded } = self;
+        let stride = H * S::F64_LANES;
+        for (j, (to, from)) in padded.chunks_exact_mut(stride).zip(a.chunks_exact_mut(n)).enumerate() {
+            to[..n].copy_from_slice(from);
+            to[n..].fill(0.0);
+            to[..j].fill(0.0);
+        }
+        for j in 0..n {
+            let (done, rest) = padded.split_at_mut(j * stride);
+            let column = S::as_mut_simd_f64s(&mut rest[..stride]).0;
+            // Two sums, so that one product need not wait for the other.
+            let mut sums = [[simd.splat_f64s(0.0); H]; 2];
+            for (k, l) in done.chunks_exact(stride).enumerate() {
+                let (factor, l) = (simd.splat_f64s(-l[j]), S::as_simd_f64s(l).0);
+                for i in 0..H {
+                    sums[k % 2][i] = simd.mul_add_e_f64s(factor, l[i], sums[k % 2][i]);
+                }
+            }
+            for i in 0..H {
+                column[i] = simd.add_f64s(column[i], simd.add_f64s(sums[0][i], sums[1][i]));
+            }
+            let pivot = rest[j];
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return false;
+            }
+            let column = S::as_mut_simd_f64s(&mut rest[..stride]).0;
+            let inverse = simd.splat_f64s(1.0 / pivot.sqrt());
+            for entry in column {
+                *entry = simd.mul_f64s(*entry, inverse);
+            }
+            a[j * n + j..(j + 1) * n].copy_from_slice(&rest[j..n]);
+        }
+        true
     }
 }
