@@ -30,8 +30,9 @@ pub(crate) struct BlockState {
     pub residual: Vec<f64>,
     pub ds: Vec<f64>,
     pub dz: Vec<f64>,
-    /// −sym(P R Z), then G.
+    /// −sym(P R Z), then G; whether that is zero.
     g: Vec<f64>,
+    vanishes: bool,
     /// P dS.
     p_ds: Vec<f64>,
     work: Vec<f64>,
@@ -67,6 +68,7 @@ impl BlockState {
             ds: zero(),
             dz: zero(),
             g: zero(),
+            vanishes: true,
             p_ds: zero(),
             work: zero(),
             product: zero(),
@@ -118,6 +120,7 @@ impl BlockState {
 
     /// G of the predictor: −sym(P R Z), zero when there is no residual.
     pub fn begin_predictor(&mut self, feasible: bool, scratch: &mut Scratch) {
+        self.vanishes = feasible;
         if feasible {
             self.g.fill(0.0);
             return;
@@ -136,6 +139,7 @@ impl BlockState {
 
     /// G of the corrector: adds σμ P − sym(P dSₐ dZₐ) to the predictor's G, for the predictor step in `ds`, `dz`.
     pub fn begin_corrector(&mut self, sigma_mu: f64, scratch: &mut Scratch) {
+        self.vanishes = false;
         if self.diagonal {
             for i in 0..self.g.len() {
                 self.g[i] += self.s_inverse[i] * (sigma_mu - self.ds[i] * self.dz[i]);
@@ -151,7 +155,9 @@ impl BlockState {
 
     /// right side ← right side + A(G).
     pub fn add_right_side(&mut self, block: &Block, out: &mut [f64]) {
-        block.adjoint(1.0, &self.g, out, &mut self.operator);
+        if !self.vanishes {
+            block.adjoint(1.0, &self.g, out, &mut self.operator);
+        }
     }
 
     /// dS and dZ from dx.

@@ -15,6 +15,7 @@
 //! alone, `(v_pᵀPv_r)(v_qᵀZv_s)`, does for all.
 
 use crate::dense::axpy;
+use crate::sparse::Entry;
 use crate::vectorized::vectorized;
 
 /// In place of a scalar unknown where a stack has a zero.
@@ -101,11 +102,33 @@ pub(crate) struct Group {
     pub cols: usize,
     pub positions: Vec<usize>,
     pub symmetric: bool,
+    /// The entries of the coefficients, where U and V have one in each column at most; otherwise none.
+    entries: Vec<Entry>,
 }
 
 impl Group {
-    fn new(u: usize, v: usize, stack: Stack, symmetric: bool) -> Self {
-        Self { u, rows: stack.u.len(), v, cols: stack.v.len(), positions: stack.positions, symmetric }
+    fn new(w: &Columns, u: usize, v: usize, stack: Stack, symmetric: bool) -> Self {
+        let (rows, cols) = (stack.u.len(), stack.v.len());
+        let mut group = Self { u, rows, v, cols, positions: stack.positions, symmetric, entries: Vec::new() };
+        if (u..u + rows).chain(v..v + cols).all(|j| w.column(j).len() <= 1) {
+            group.entries = group.single_entries(w);
+        }
+        group
+    }
+
+    fn single_entries(&self, w: &Columns) -> Vec<Entry> {
+        let places = self.positions.iter().enumerate().filter(|(_, at)| **at != NO_UNKNOWN);
+        let entry = |(at, &unknown): (usize, &usize)| {
+            let (r, s) = (at / self.cols, at % self.cols);
+            // Of a symmetric unknown one of two places speaks for both.
+            if self.symmetric && r < s {
+                return None;
+            }
+            let (&(i, a), &(j, b)) = (w.column(self.u + r).first()?, w.column(self.v + s).first()?);
+            let value = if i == j && !self.symmetric { 2.0 * a * b } else { a * b };
+            Some(Entry { unknown, row: i.max(j), column: i.min(j), value })
+        };
+        places.filter_map(entry).collect()
     }
 
     /// What the columns of W that are taken for U are multiplied by.
@@ -141,14 +164,15 @@ impl Factored {
             let mirrored = stack.mirrored();
             if let Some(rows_of_v) = &mirrored {
                 let v = columns_of_v(&mut w);
-                groups.push(Group::new(v, v, stack.of_rows(rows_of_v), true));
+                groups.push(Group::new(&w, v, v, stack.of_rows(rows_of_v), true));
             }
             let left = |r: &usize| mirrored.as_ref().is_none_or(|rows| !rows.contains(r));
             let rest: Vec<usize> = (0..stack.u.len()).filter(left).collect();
             if !rest.is_empty() {
                 let rest = stack.of_rows(&rest).by_last_unknown();
                 let v = columns_of_v(&mut w);
-                groups.push(Group::new(w.push_whole_vectors(&rest.u), v, rest, false));
+                let u = w.push_whole_vectors(&rest.u);
+                groups.push(Group::new(&w, u, v, rest, false));
             }
         }
         Self { n, w, groups }
@@ -196,14 +220,20 @@ impl Factored {
     /// out ← out + F(x) − F(0).
     pub fn apply(&self, x: &[f64], out: &mut [f64], scratch: &mut FactoredScratch) {
         for group in &self.groups {
-            apply(self.n, &self.w, group, x, &mut scratch.product, out);
+            if group.entries.is_empty() {
+                apply(self.n, &self.w, group, x, &mut scratch.product, out);
+            }
+            group.entries.iter().for_each(|entry| entry.apply(self.n, x, out));
         }
     }
 
     /// out_i ← out_i + factor·⟨F_i, H⟩ for symmetric H.
     pub fn adjoint(&self, factor: f64, h: &[f64], out: &mut [f64], scratch: &mut FactoredScratch) {
         for group in &self.groups {
-            adjoint(self.n, &self.w, group, factor, h, &mut scratch.product, out);
+            if group.entries.is_empty() {
+                adjoint(self.n, &self.w, group, factor, h, &mut scratch.product, out);
+            }
+            group.entries.iter().for_each(|entry| out[entry.unknown] += factor * entry.inner_product(self.n, h));
         }
     }
 
@@ -223,6 +253,8 @@ impl Factored {
     /// F ← D F D for a diagonal D.
     pub fn scale(&mut self, d: &[f64]) {
         self.w.entries.iter_mut().for_each(|(i, value)| *value *= d[*i]);
+        let entries = self.groups.iter_mut().flat_map(|group| &mut group.entries);
+        entries.for_each(|entry| entry.value *= d[entry.row] * d[entry.column]);
     }
 
     /// out_i ← max(out_i, estimate of ‖D F_i D‖_F) for a diagonal D.

@@ -17,6 +17,25 @@ pub(crate) struct Entry {
     pub value: f64,
 }
 
+impl Entry {
+    /// out ← out + x·(the entry and its mirror image), n × n.
+    #[inline(always)]
+    pub fn apply(&self, n: usize, x: &[f64], out: &mut [f64]) {
+        let &Self { unknown, row, column, value } = self;
+        out[row + column * n] += value * x[unknown];
+        if row != column {
+            out[column + row * n] += value * x[unknown];
+        }
+    }
+
+    /// Its part of ⟨F, H⟩ for symmetric H, n × n.
+    #[inline(always)]
+    pub fn inner_product(&self, n: usize, h: &[f64]) -> f64 {
+        let &Self { row, column, value, .. } = self;
+        (if row == column { value } else { 2.0 * value }) * h[row + column * n]
+    }
+}
+
 /// The coefficient matrix of one unknown.
 #[derive(Debug)]
 struct Coefficient {
