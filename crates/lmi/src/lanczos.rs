@@ -29,9 +29,9 @@ impl Lanczos {
 
     /// An estimate from below, to the relative `accuracy`, of the largest α with `S + αD ⪰ 0`; infinite when the estimate finds no end.
     ///
-    /// Given are S itself, its inverse and D, symmetric n × n.
-    pub fn step(&mut self, n: usize, s: &[f64], s_inverse: &[f64], d: &[f64], accuracy: f64) -> f64 {
-        pulp::Arch::new().dispatch(LongestStep { lanczos: self, n, s, s_inverse, d, accuracy })
+    /// Given are S itself, its inverse and D, symmetric n × n, and a step beyond which nothing need be known.
+    pub fn step(&mut self, n: usize, [s, s_inverse, d]: [&[f64]; 3], accuracy: f64, enough: f64) -> f64 {
+        pulp::Arch::new().dispatch(LongestStep { lanczos: self, n, s, s_inverse, d, accuracy, enough })
     }
 }
 
@@ -42,6 +42,7 @@ struct LongestStep<'a> {
     s_inverse: &'a [f64],
     d: &'a [f64],
     accuracy: f64,
+    enough: f64,
 }
 
 impl pulp::WithSimd for LongestStep<'_> {
@@ -49,7 +50,7 @@ impl pulp::WithSimd for LongestStep<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) -> f64 {
-        let Self { lanczos, n, s, s_inverse, d, accuracy } = self;
+        let Self { lanczos, n, s, s_inverse, d, accuracy, enough } = self;
         let Lanczos { v, sv, sv_before, w, u } = lanczos;
         let (v, sv, sv_before) = (&mut v[..n], &mut sv[..n], &mut sv_before[..n]);
         let (w, u) = (&mut w[..n], &mut u[..n]);
@@ -89,7 +90,7 @@ impl pulp::WithSimd for LongestStep<'_> {
                 // Some eigenvalue lies within `residual` of the Ritz value.
                 let residual = if k + 1 == n { 0.0 } else { beta * component };
                 smallest = value - residual;
-                if last || residual <= accuracy * value.abs() || (value > -1e-1 && value - residual > -0.5) {
+                if last || residual <= accuracy * value.abs() || smallest * enough > -1.0 {
                     break;
                 }
             }
@@ -188,7 +189,7 @@ mod tests {
                 faer::Par::Seq,
             );
             let smallest = whole.self_adjoint_eigenvalues(Side::Lower).unwrap()[0];
-            let step = Lanczos::new(n).step(n, &s, &inverse, &d, 0.05);
+            let step = Lanczos::new(n).step(n, [&s, &inverse, &d], 0.05, 20.0);
             if smallest > -0.05 {
                 assert!(step > 5.0, "{n}: {step} for {smallest}");
                 continue;
