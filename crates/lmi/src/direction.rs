@@ -224,8 +224,8 @@ impl BlockState {
         block.apply(y, &mut self.dz, &mut self.operator);
     }
 
-    /// Estimates of the longest steps that keep S and Z positive semidefinite, as far as they are shorter than those given.
-    pub fn longest_steps(&self, lanczos: &mut Lanczos, accuracy: f64, (primal, dual): (f64, f64)) -> (f64, f64) {
+    /// Estimates of the longest steps that keep S and Z positive semidefinite.
+    pub fn longest_steps(&self, lanczos: &mut Lanczos, accuracy: f64) -> (f64, f64) {
         if self.diagonal {
             let ratio = |value: &[f64], step: &[f64]| {
                 let ends = value.iter().zip(step).filter(|(_, step)| **step < 0.0).map(|(v, d)| -v / d);
@@ -233,8 +233,8 @@ impl BlockState {
             };
             return (ratio(&self.s, &self.ds), ratio(&self.z, &self.dz));
         }
-        let primal = lanczos.step(self.n, [&self.s, &self.s_inverse, &self.ds], accuracy, primal);
-        let dual = lanczos.step(self.n, [&self.z, &self.z_inverse, &self.dz], accuracy, dual);
+        let primal = lanczos.step(self.n, [&self.s, &self.s_inverse, &self.ds], accuracy);
+        let dual = lanczos.step(self.n, [&self.z, &self.z_inverse, &self.dz], accuracy);
         (primal, dual)
     }
 

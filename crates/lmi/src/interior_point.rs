@@ -38,8 +38,6 @@ const NOISE: f64 = 1e-6;
 /// Where regularisation of such a direction begins, relative to the diagonal of M, and ends.
 const LEAST_REGULARIZATION: f64 = 1e-15;
 const MOST_REGULARIZATION: f64 = 1e-11;
-/// A longer step is a whole one, whatever fraction of it is taken.
-const WHOLE_STEP: f64 = 1.2;
 /// Rounds of refinement of one direction at most.
 const REFINEMENTS: usize = 10;
 
@@ -486,11 +484,10 @@ impl<'a> Iteration<'a> {
         last
     }
 
-    /// The longest steps over all blocks, as far as they are shorter than [`WHOLE_STEP`].
     fn longest_steps(&mut self, accuracy: f64) -> (f64, f64) {
-        let (mut primal, mut dual) = (WHOLE_STEP, WHOLE_STEP);
+        let (mut primal, mut dual) = (f64::INFINITY, f64::INFINITY);
         for state in &self.blocks {
-            let (p, d) = state.longest_steps(&mut self.lanczos, accuracy, (primal, dual));
+            let (p, d) = state.longest_steps(&mut self.lanczos, accuracy);
             (primal, dual) = (primal.min(p), dual.min(d));
         }
         (primal, dual)

@@ -6,11 +6,10 @@
 
 use crate::dense::{apply, axpy, dot};
 
+/// Minors below this are scaled up, so that none vanishes for want of exponents.
+const TINY: f64 = 1e-100;
 /// Most steps of one estimate. The result is safe-guarded by a Cholesky factorisation, so that few suffice.
 const STEPS: usize = 30;
-
-/// From this accuracy on an estimate may end after two steps.
-const COARSE: f64 = 0.1;
 
 /// Scratch memory for matrices up to a size.
 #[derive(Debug)]
@@ -29,9 +28,9 @@ impl Lanczos {
 
     /// An estimate from below, to the relative `accuracy`, of the largest α with `S + αD ⪰ 0`; infinite when the estimate finds no end.
     ///
-    /// Given are S itself, its inverse and D, symmetric n × n, and a step beyond which nothing need be known.
-    pub fn step(&mut self, n: usize, [s, s_inverse, d]: [&[f64]; 3], accuracy: f64, enough: f64) -> f64 {
-        pulp::Arch::new().dispatch(LongestStep { lanczos: self, n, s, s_inverse, d, accuracy, enough })
+    /// Given are S itself, its inverse and D, symmetric n × n.
+    pub fn step(&mut self, n: usize, [s, s_inverse, d]: [&[f64]; 3], accuracy: f64) -> f64 {
+        pulp::Arch::new().dispatch(LongestStep { lanczos: self, n, s, s_inverse, d, accuracy })
     }
 }
 
@@ -42,7 +41,6 @@ struct LongestStep<'a> {
     s_inverse: &'a [f64],
     d: &'a [f64],
     accuracy: f64,
-    enough: f64,
 }
 
 impl pulp::WithSimd for LongestStep<'_> {
@@ -50,7 +48,7 @@ impl pulp::WithSimd for LongestStep<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) -> f64 {
-        let Self { lanczos, n, s, s_inverse, d, accuracy, enough } = self;
+        let Self { lanczos, n, s, s_inverse, d, accuracy } = self;
         let Lanczos { v, sv, sv_before, w, u } = lanczos;
         let (v, sv, sv_before) = (&mut v[..n], &mut sv[..n], &mut sv_before[..n]);
         let (w, u) = (&mut w[..n], &mut u[..n]);
@@ -67,8 +65,6 @@ impl pulp::WithSimd for LongestStep<'_> {
         sv_before.fill(0.0);
         let (mut alphas, mut betas) = ([0.0; STEPS], [0.0; STEPS]);
         let mut smallest = f64::NAN;
-        // Where little is asked for little may do.
-        let first = if accuracy < COARSE { 3 } else { 1 };
         for k in 0..STEPS.min(n) {
             apply(simd, n, d, v, w);
             if k > 0 {
@@ -85,12 +81,12 @@ impl pulp::WithSimd for LongestStep<'_> {
             alphas[k] = alpha;
             betas[k] = beta;
             let last = k + 1 == STEPS.min(n) || beta <= 1e-12 * alphas[0].abs();
-            if last || (k >= first && k % 2 == 1) {
+            if last || (k >= 3 && k % 2 == 1) {
                 let (value, component) = smallest_of_tridiagonal(&alphas[..=k], &betas[..k], 0.02 * accuracy);
                 // Some eigenvalue lies within `residual` of the Ritz value.
                 let residual = if k + 1 == n { 0.0 } else { beta * component };
                 smallest = value - residual;
-                if last || residual <= accuracy * value.abs() || smallest * enough > -1.0 {
+                if last || residual <= accuracy * value.abs() || (value > -1e-1 && smallest > -0.5) {
                     break;
                 }
             }
@@ -122,7 +118,7 @@ fn smallest_of_tridiagonal(diagonal: &[f64], off: &[f64], accuracy: f64) -> (f64
         let mut positive = minor > 0.0;
         for i in 1..k {
             let next = unit * (diagonal[i] - lambda) * minor - (unit * off[i - 1]).powi(2) * before;
-            (before, minor) = (minor, next);
+            (before, minor) = if next.abs() < TINY { (minor / TINY, next / TINY) } else { (minor, next) };
             positive &= minor > 0.0;
         }
         positive
@@ -189,7 +185,7 @@ mod tests {
                 faer::Par::Seq,
             );
             let smallest = whole.self_adjoint_eigenvalues(Side::Lower).unwrap()[0];
-            let step = Lanczos::new(n).step(n, [&s, &inverse, &d], 0.05, 20.0);
+            let step = Lanczos::new(n).step(n, [&s, &inverse, &d], 0.05);
             if smallest > -0.05 {
                 assert!(step > 5.0, "{n}: {step} for {smallest}");
                 continue;
