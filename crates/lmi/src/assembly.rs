@@ -197,15 +197,20 @@ impl Line {
             let column = unknown * n + first;
             axpy(1.0, &run[before..], &mut m[column + before..column + self.run]);
             if (first..first + self.run).contains(&unknown) {
-                // The unknown has a place in both lines, and each is the first of a pair.
+                // As in `add_entry`.
                 m[unknown * n + unknown] += run[before];
             }
         }
         for (&at, value) in self.positions[self.run..].iter().zip(scattered).filter(|(at, _)| **at != NO_UNKNOWN) {
-            let value = if at == unknown { 2.0 * value } else { *value };
-            m[at.min(unknown) * n + at.max(unknown)] += value;
+            add_entry(m, n, at, unknown, *value);
         }
     }
+}
+
+/// Adds what the places of two unknowns, not the same, have in common: twice where they belong to one unknown, as each is the first of a pair.
+#[inline(always)]
+fn add_entry(m: &mut [f64], n: usize, i: usize, j: usize, value: f64) {
+    m[i.min(j) * n + i.max(j)] += if i == j { 2.0 * value } else { value };
 }
 
 /// All sums, one first line after the other.
@@ -241,8 +246,7 @@ impl pulp::WithSimd for Sums<'_> {
                     // The sum of a line with itself is symmetric: one half of it, and the diagonal once.
                     m[unknown * n + unknown] += entries[q];
                     for (&at, value) in positions[..q].iter().zip(entries).filter(|(at, _)| **at != NO_UNKNOWN) {
-                        let value = if at == unknown { 2.0 * value } else { *value };
-                        m[at.min(unknown) * n + at.max(unknown)] += value;
+                        add_entry(m, n, at, unknown, *value);
                     }
                 }
             }
