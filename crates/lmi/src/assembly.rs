@@ -258,10 +258,8 @@ impl pulp::WithSimd for Sums<'_> {
 #[inline(always)]
 fn add_pair<S: pulp::Simd>(simd: S, part: &Part, [p, r]: [Row; 2], width: usize, sum: &mut [f64]) {
     let Part { w, wpw, wzw } = part;
-    let row = |of: &'_ [f64], u: usize| -> Range<usize> { u * w..(u * w + w).min(of.len()) };
-    let (pu, zu) = (&wpw[row(wpw, p.u)], &wzw[row(wzw, p.u)]);
-    let (pr, zr) = (&wpw[row(wpw, r.u)], &wzw[row(wzw, r.u)]);
-    let pair = Projected { p, r, stride: w / S::F64_LANES, part: [wpw, wzw], first: [pu, zu], second: [pr, zr] };
+    let row = |u: usize| [&wpw[u * w..(u + 1) * w], &wzw[u * w..(u + 1) * w]];
+    let pair = Projected { p, r, stride: w / S::F64_LANES, part: [wpw, wzw], first: row(p.u), second: row(r.u) };
     let vectors = width / S::F64_LANES;
     for first in (0..vectors).step_by(4) {
         match vectors - first {

@@ -52,6 +52,13 @@ struct Coefficient {
     whole: bool,
 }
 
+impl Coefficient {
+    fn lower_entries(&self) -> impl Iterator<Item = Entry> {
+        let unknown = self.unknown;
+        self.entries.iter().map(move |&(row, column, value)| Entry { unknown, row, column, value })
+    }
+}
+
 /// The sparse part of a block.
 #[derive(Debug, Default)]
 pub(crate) struct Sparse {
@@ -156,24 +163,14 @@ impl Sparse {
     /// out ← out + F(x) − F(0).
     pub fn apply(&self, x: &[f64], out: &mut [f64]) {
         for c in &self.coefficients {
-            let x = x[c.unknown];
-            for &(i, j, value) in &c.entries {
-                out[i + j * self.n] += x * value;
-                if i != j {
-                    out[j + i * self.n] += x * value;
-                }
-            }
+            c.lower_entries().for_each(|entry| entry.apply(self.n, x, out));
         }
     }
 
     /// out_i ← out_i + factor·⟨F_i, H⟩ for symmetric H.
     pub fn adjoint(&self, factor: f64, h: &[f64], out: &mut [f64]) {
         for c in &self.coefficients {
-            let inner: f64 = c
-                .entries
-                .iter()
-                .map(|&(i, j, value)| if i == j { value * h[i + j * self.n] } else { 2.0 * value * h[i + j * self.n] })
-                .sum();
+            let inner: f64 = c.lower_entries().map(|entry| entry.inner_product(self.n, h)).sum();
             out[c.unknown] += factor * inner;
         }
     }
