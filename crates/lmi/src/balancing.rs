@@ -89,7 +89,7 @@ pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) ->
 fn far_off(solution: &Solution, options: &Options) -> bool {
     let Residuals { primal, dual, gap, .. } = solution.residuals;
     let near = primal.max(dual) <= 10.0 * options.feasibility_tolerance && gap <= FAR_OFF;
-    matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled)) && !near
+    matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled | InaccurateReason::NotAttained)) && !near
 }
 
 /// Whether the first of two solutions is the better one.

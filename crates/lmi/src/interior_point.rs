@@ -24,10 +24,13 @@ pub(crate) const SOLVED_GAP: f64 = 1e-7;
 const SOLVED_UNCERTAINTY: f64 = 1e-6;
 /// Relative gap at which a point is kept for neighbouring problems to begin at.
 const CENTRAL: f64 = 3e-2;
-/// Where x still grows by this factor in each of so many last iterations no x attains the optimum: close to one that is attained x hardly
-/// moves.
-const GROWTH: f64 = 1.25;
+/// Where x still grows by this factor in each of so many last iterations, as the gap closes or until no progress is made, no x attains the
+/// optimum: close to one that is attained x hardly moves.
+const GROWTH: f64 = 1.1;
 const GROWING: usize = 4;
+/// Where the gap closes all the same, the point is as good as optimal unless x has grown by this factor since the gap was this small.
+const UNATTAINED: f64 = 2e4;
+const NEAR: f64 = 1e-2;
 /// A multiplier is a witness of infeasibility when its residual is this small against the dual objective: rounding level.
 const CERTIFICATE: f64 = 1e-14;
 
@@ -251,9 +254,12 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         },
         other => other,
     };
-    let grows = sizes.len() > GROWING && sizes[sizes.len() - 1 - GROWING..].windows(2).all(|w| w[1] > GROWTH * w[0]);
     let ending = match ending {
-        Ending::Converged if grows => Ending::Stopped(InaccurateReason::NotAttained),
+        Ending::Converged | Ending::Stopped(InaccurateReason::Stalled)
+            if unattained(&log, &sizes, &ending, options) =>
+        {
+            Ending::Stopped(InaccurateReason::NotAttained)
+        }
         other => other,
     };
     // Every course has a first point.
@@ -261,6 +267,19 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let units = program.scale.clone();
     let Status { residuals, dual_objective, .. } = status;
     Solution { point, ending, residuals, dual_objective, interior, centre, units, log }
+}
+
+/// Whether the objective came closer to its bound only as x grew, from the norms of x in each iteration.
+fn unattained(log: &[IterationLog], sizes: &[f64], ending: &Ending, options: &Options) -> bool {
+    let within = |gap: f64| {
+        let feasible = |r: &Residuals| r.primal <= options.feasibility_tolerance && r.gap <= gap;
+        log.iter().position(|entry| feasible(&entry.residuals))
+    };
+    // Where the gap has closed, rounding errors may carry x on.
+    let last = within(SOLVED_GAP).unwrap_or(log.len() - 1);
+    let Some(first) = within(NEAR).or_else(|| within(1.0)) else { return false };
+    let grows = last >= GROWING && sizes[last - GROWING..=last].windows(2).all(|w| w[1] > GROWTH * w[0]);
+    grows && (!matches!(ending, Ending::Converged) || sizes[last] > UNATTAINED * sizes[first])
 }
 
 impl<'a> Iteration<'a> {
@@ -410,8 +429,9 @@ impl<'a> Iteration<'a> {
             }
             regularization = (100.0 * self.schur.regularization).max(LEAST_REGULARIZATION);
         }
-        let fraction = 0.9 + 0.09 * primal.min(dual);
-        let (primal, dual) = self.longest_steps(0.05);
+        let fraction = 0.9 + 0.098 * primal.min(dual);
+        // As accurate as what is left to the boundary: close to the optimum the step decides how far the gap falls.
+        let (primal, dual) = self.longest_steps(0.5 * (1.0 - fraction));
         let (primal, dual) = ((fraction * primal).min(1.0), (fraction * dual).min(1.0));
         let primal = self.safeguard(primal, BlockState::try_primal)?;
         let dual = self.safeguard(dual, BlockState::try_dual)?;

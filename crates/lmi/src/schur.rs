@@ -3,9 +3,12 @@
 
 use crate::dense::{Scratch, axpy, cholesky, dot, norm, solve_with_factor};
 use crate::vectorized::vectorized;
+use faer::{Mat, Side};
 
 /// Rounds of refinement at most.
 const ROUNDS: usize = 4;
+/// An eigenvalue that is more negative than this, the diagonal being 1, does not come from the rounding of the factorisation.
+const INDEFINITE: f64 = 1e-3;
 
 /// M with its factorisation.
 pub(crate) struct Schur {
@@ -13,7 +16,7 @@ pub(crate) struct Schur {
     /// The lower triangle of M, column by column.
     pub matrix: Vec<f64>,
     factor: Vec<f64>,
-    /// 1/√M_ii: the factorised matrix is scaled to a unit diagonal.
+    /// 1/√M_ii: the factorised matrix is scaled to a unit diagonal. Zero for unknowns that stay where they are.
     scale: Vec<f64>,
     scratch: Scratch,
     residual: Vec<f64>,
@@ -54,22 +57,16 @@ impl Schur {
     }
 
     /// Factorises M. Unknowns that appear nowhere stay where they are; linearly dependent coefficient matrices
-    /// are met by adding to the (unit) diagonal, from `regularization` or rounding level upwards. False when M is not finite.
+    /// are met by adding to the (unit) diagonal, from `regularization` or rounding level upwards. Where that is not enough, unknowns
+    /// whose entries are nothing but rounding errors stay where they are, too. False when M is not finite.
     pub fn factorize(&mut self, regularization: f64) -> bool {
         let n = self.n;
-        let largest = (0..n).map(|i| self.matrix[i + i * n]).fold(0.0, f64::max);
-        if !largest.is_finite() {
-            return false;
-        }
         for i in 0..n {
-            let diagonal = &mut self.matrix[i + i * n];
-            if diagonal.is_nan() {
+            let diagonal = self.matrix[i + i * n];
+            if !diagonal.is_finite() {
                 return false;
             }
-            if *diagonal <= f64::MIN_POSITIVE {
-                *diagonal = 1.0;
-            }
-            self.scale[i] = 1.0 / diagonal.sqrt();
+            self.scale[i] = if diagonal > f64::MIN_POSITIVE { 1.0 / diagonal.sqrt() } else { 0.0 };
         }
         self.regularization = regularization;
         loop {
@@ -78,10 +75,26 @@ impl Schur {
                 return true;
             }
             self.regularization = if self.regularization == 0.0 { 1e-16 } else { self.regularization * 4.0 };
-            if self.regularization > 1e-3 {
-                return false;
+            if self.regularization > INDEFINITE {
+                let Some(noise) = self.noise() else { return false };
+                self.scale[noise] = 0.0;
+                self.regularization = regularization;
             }
         }
+    }
+
+    /// Of an indefinite M, scaled to a unit diagonal: the unknown with the largest part in the eigenvector of the smallest eigenvalue.
+    ///
+    /// Where a multiplier comes to vanish along a coefficient matrix, as in problems whose optimal set is unbounded, that unknown's
+    /// entries of M are differences of large numbers, and the scaling raises them to the level of all others.
+    fn noise(&self) -> Option<usize> {
+        let (n, m, s) = (self.n, &self.matrix, &self.scale);
+        let entry = |i: usize, j: usize| m[i.max(j) + i.min(j) * n] * s[i] * s[j];
+        let scaled = Mat::from_fn(n, n, |i, j| if i == j { 1.0 } else { entry(i, j) });
+        let spectrum = scaled.self_adjoint_eigen(Side::Lower).ok()?;
+        let vector = spectrum.U().col(0);
+        let worst = (0..n).max_by(|&i, &j| vector[i].abs().total_cmp(&vector[j].abs()))?;
+        (spectrum.S()[0] < 0.0 && s[worst] > 0.0).then_some(worst)
     }
 
     /// Solves M x = r by the factor and iterative refinement against M itself.
@@ -127,6 +140,7 @@ impl Schur {
     /// residual = r − M x from the lower triangle.
     fn update_residual(&mut self, r: &[f64], x: &[f64]) {
         subtract_product(self.n, &self.matrix, r, x, &mut self.residual);
+        self.residual.iter_mut().zip(&self.scale).filter(|(_, s)| **s == 0.0).for_each(|(r, _)| *r = 0.0);
     }
 }
 

@@ -222,3 +222,46 @@ proptest! {
         prop_assert!((structured.objective - sparse.objective).abs() < 1e-6 * (1.0 + sparse.objective.abs()));
     }
 }
+
+/// Graph equipartition, minimise Σ yᵢ over y₀eeᵀ + Diag(y) − L ⪰ 0: its multipliers Z have eᵀZe = 0, no interior, and y₀ may grow without
+/// end. On the complement of e there is nothing of that, and the optimum is the same.
+#[test]
+fn multipliers_without_interior() {
+    let cases = 40;
+    let mut solved = 0;
+    for seed in 0..cases {
+        let mut numbers = Numbers(seed);
+        let n = 10 + seed as usize;
+        let weights = Mat::from_fn(n, n, |_, _| f64::from(u8::from(numbers.next() > 0.6)));
+        let weight = |i: usize, j: usize| weights[(i.max(j), i.min(j))];
+        let degree = |i: usize| (0..n).filter(|&j| j != i).map(|j| weight(i, j)).sum::<f64>();
+        let laplacian = Mat::from_fn(n, n, |i, j| if i == j { degree(i) } else { -weight(i, j) });
+        let whole = bound(&laplacian, |problem, f| f + problem.scalar("y0").times(&Mat::from_fn(n, n, |_, _| 1.0)));
+        // Columns e_i − e_{n−1}.
+        let complement = Mat::from_fn(n, n - 1, |i, j| f64::from(i8::from(i == j) - i8::from(i == n - 1)));
+        let reduced = bound(&laplacian, |_, f| complement.transpose().to_owned() * f * &complement);
+        assert!(matches!(reduced.outcome, Outcome::Solved), "{seed}: {:?}", reduced.outcome);
+        assert!(
+            !matches!(whole.outcome, Outcome::Infeasible(_) | Outcome::Unbounded(_)),
+            "{seed}: {:?}",
+            whole.outcome
+        );
+        solved += usize::from(matches!(whole.outcome, Outcome::Solved));
+        let difference = (whole.objective - reduced.objective).abs() / (1.0 + reduced.objective.abs());
+        assert!(difference < 1e-6, "{seed}: {} {}", whole.objective, reduced.objective);
+    }
+    assert!(10 * solved >= 9 * cases as usize, "{solved} of {cases}");
+}
+
+/// minimise Σ yᵢ over F(Diag(y) − L) ⪰ 0.
+fn bound(laplacian: &Mat<f64>, f: impl Fn(&mut Problem, Expr) -> Expr) -> lmi::Answer {
+    let n = laplacian.nrows();
+    let mut problem = Problem::new();
+    let y: Vec<Expr> = (0..n).map(|i| problem.scalar(format!("y{i}"))).collect();
+    let unit = |at: usize| Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == at && j == at)));
+    let diagonal = y.iter().enumerate().fold(Expr::from(-laplacian), |sum, (i, y)| sum + y.times(&unit(i)));
+    let block = f(&mut problem, diagonal);
+    problem.positive_definite_by("bound", block, 0.0);
+    problem.minimize(&y.iter().fold(Expr::zeros(1, 1), |sum, y| sum + y));
+    problem.solve(&Options::default()).unwrap()
+}

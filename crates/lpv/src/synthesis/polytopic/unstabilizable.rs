@@ -72,11 +72,14 @@ pub(super) fn point(
     for _ in 0..3 {
         weights = moved(polytope, &weights, &w)?;
         let model = polytope.at(&weights);
-        // eigenvalues of a defective A(ρ), which double integrators make, are no better than roots of rounding errors: zero is tried too
-        let real = eigenvalues(&model.a).into_iter().filter(|&(_, im)| im == 0.0).map(|(re, _)| re);
-        let tried = [0.0, quadratic_form(&model.a, &w)].into_iter().chain(real);
-        best = (tried.filter_map(|eigenvalue| at(polytope, &weights, [eigenvalue, 0.0])))
-            .min_by(|a, b| a.residual.total_cmp(&b.residual));
+        // eigenvalues of a defective A(ρ), which double integrators make, are no better than roots of rounding errors: zero comes first
+        let zero = at(polytope, &weights, [0.0, 0.0]).filter(|point| holds(polytope, point));
+        best = zero.or_else(|| {
+            let real = eigenvalues(&model.a).into_iter().filter(|&(_, im)| im == 0.0).map(|(re, _)| re);
+            let tried = [0.0, quadratic_form(&model.a, &w)].into_iter().chain(real);
+            (tried.filter_map(|eigenvalue| at(polytope, &weights, [eigenvalue, 0.0])))
+                .min_by(|a, b| a.residual.total_cmp(&b.residual))
+        });
         w.clone_from(&best.as_ref()?.direction);
     }
     best.filter(|point| holds(polytope, point))
