@@ -207,6 +207,22 @@ impl BlockState {
         dense::axpy(-1.0, &self.work, &mut self.dz);
     }
 
+    /// dZ ← dZ + Z (F(y) − F(0)) Z.
+    pub fn move_dual(&mut self, block: &Block, y: &[f64], scratch: &mut Scratch) {
+        self.work.fill(0.0);
+        block.apply(y, &mut self.work, &mut self.operator);
+        if self.diagonal {
+            for i in 0..self.dz.len() {
+                self.dz[i] += self.z[i] * self.work[i] * self.z[i];
+            }
+            return;
+        }
+        dense::multiply(self.n, &self.z, &self.work, &mut self.product, scratch);
+        dense::multiply(self.n, &self.product, &self.z, &mut self.work, scratch);
+        dense::symmetrize(self.n, &mut self.work);
+        dense::axpy(1.0, &self.work, &mut self.dz);
+    }
+
     /// The identity, in the block's storage.
     pub fn identity(&self) -> Vec<f64> {
         if self.diagonal {

@@ -43,6 +43,9 @@ const LEAST_REGULARIZATION: f64 = 1e-15;
 const MOST_REGULARIZATION: f64 = 1e-11;
 /// Rounds of refinement of one direction at most.
 const REFINEMENTS: usize = 10;
+/// Dual residual of a direction, against the tolerance, from which on Z + dZ is projected, and rounds of that.
+const MISSED: f64 = 0.1;
+const PROJECTIONS: usize = 4;
 
 /// A point of the iteration.
 #[derive(Clone, Debug, Default)]
@@ -404,23 +407,16 @@ impl<'a> Iteration<'a> {
 
     /// One predictor-corrector step: (centring, primal step, dual step), or `None` when no step can be taken.
     fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
-        let unknowns = self.x.len();
-        self.schur.clear();
-        for (index, (state, block)) in self.blocks.iter_mut().zip(self.operators).enumerate() {
-            state.invert(&mut self.scratch);
-            let BlockState { s_inverse, z, operator, .. } = state;
-            block.schur(index, [s_inverse, z], &mut self.assembly, &mut self.schur.matrix, unknowns, operator);
-        }
-        self.assembly.add(&mut self.schur.matrix, unknowns);
-        self.schur.scale_by(self.scale);
-        let (mut sigma, mut primal, mut dual);
+        self.blocks.iter_mut().for_each(|state| state.invert(&mut self.scratch));
+        self.assemble(|state| [&state.s_inverse, &state.z]);
+        let (mut sigma, mut primal, mut dual, mut left);
         let mut regularization = 0.0;
         loop {
             if !self.schur.factorize(regularization) {
                 return None;
             }
             (sigma, primal, dual) = self.predict_and_correct(status);
-            let left = self.refine();
+            left = self.refine();
             // A direction that misses the dual equations by more than they are missed now is noise: M is factorised
             // again, a little further from singular.
             let bad = left.is_nan() || left > NOISE.max(2.0 * status.residuals.dual);
@@ -428,6 +424,9 @@ impl<'a> Iteration<'a> {
                 break;
             }
             regularization = (100.0 * self.schur.regularization).max(LEAST_REGULARIZATION);
+        }
+        if left > MISSED * self.options.feasibility_tolerance {
+            self.project(left);
         }
         let fraction = 0.9 + 0.098 * primal.min(dual);
         // As accurate as what is left to the boundary: close to the optimum the step decides how far the gap falls.
@@ -438,6 +437,20 @@ impl<'a> Iteration<'a> {
         self.blocks.iter_mut().for_each(|state| state.advance(primal, dual));
         crate::dense::axpy(primal, &self.dx, &mut self.x);
         Some((sigma, primal, dual))
+    }
+
+    /// M ← Σ_b tr(F_i P F_j Z) for the P and Z that every block gives.
+    fn assemble(&mut self, factors: fn(&BlockState) -> [&Vec<f64>; 2]) {
+        let unknowns = self.x.len();
+        self.schur.clear();
+        for (index, (state, block)) in self.blocks.iter_mut().zip(self.operators).enumerate() {
+            let mut operator = std::mem::take(&mut state.operator);
+            let [p, z] = factors(state);
+            block.schur(index, [p, z], &mut self.assembly, &mut self.schur.matrix, unknowns, &mut operator);
+            state.operator = operator;
+        }
+        self.assembly.add(&mut self.schur.matrix, unknowns);
+        self.schur.scale_by(self.scale);
     }
 
     /// The predictor, then the corrector's direction: (centring, primal step, dual step of the predictor).
@@ -478,13 +491,7 @@ impl<'a> Iteration<'a> {
     fn refine(&mut self) -> f64 {
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
-            self.right_side.fill(0.0);
-            for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-                state.subtract_dual(block, &mut self.right_side);
-            }
-            scale_by(self.scale, &mut self.right_side);
-            crate::dense::axpy(1.0, self.objective, &mut self.right_side);
-            let size = self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs())) / (1.0 + self.objective_norm);
+            let size = self.miss();
             if size.is_nan() || size <= 1e-3 * self.options.feasibility_tolerance || size > 0.9 * last {
                 return size;
             }
@@ -502,6 +509,49 @@ impl<'a> Iteration<'a> {
             }
         }
         last
+    }
+
+    /// `right_side` ← c − A(Z + dZ); gives its relative size.
+    fn miss(&mut self) -> f64 {
+        self.right_side.fill(0.0);
+        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
+            state.subtract_dual(block, &mut self.right_side);
+        }
+        scale_by(self.scale, &mut self.right_side);
+        crate::dense::axpy(1.0, self.objective, &mut self.right_side);
+        self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs())) / (1.0 + self.objective_norm)
+    }
+
+    /// Moves Z + dZ towards A(Z) = c by Z F(y) Z, for a y from the equations with Z in place of S⁻¹: what rounding leaves of the direction
+    /// in degenerate problems comes from the large S⁻¹, which has no part in this. Relative to Z the change is small. It takes the place of M.
+    fn project(&mut self, left: f64) {
+        self.assemble(|state| [&state.z, &state.z]);
+        if !self.schur.factorize(0.0) {
+            return;
+        }
+        let mut last = left;
+        for _ in 0..PROJECTIONS {
+            self.miss();
+            self.schur.solve(&self.right_side, &mut self.change);
+            product(self.scale, &self.change, &mut self.unscaled);
+            self.move_dual();
+            let size = self.miss();
+            if size.is_nan() || size > last {
+                self.unscaled.iter_mut().for_each(|y| *y = -*y);
+                self.move_dual();
+            }
+            if size.is_nan() || size > 0.5 * last {
+                return;
+            }
+            last = size;
+        }
+    }
+
+    /// dZ ← dZ + Z F(y) Z for the y in `unscaled`.
+    fn move_dual(&mut self) {
+        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
+            state.move_dual(block, &self.unscaled, &mut self.scratch);
+        }
     }
 
     fn longest_steps(&mut self, accuracy: f64) -> (f64, f64) {
