@@ -13,6 +13,7 @@
 use crate::block::Block;
 use crate::dense::axpy;
 use crate::factored::{Factored, Group, NO_UNKNOWN, PADDING};
+use crate::vectorized::arch;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -162,7 +163,7 @@ impl Assembly {
 
     /// Adds the sum over all blocks of tr(F_i P F_j Z) to M, lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
     pub fn add(&mut self, m: &mut [f64], unknowns: usize) {
-        pulp::Arch::new().dispatch(Sums { assembly: self, m, unknowns });
+        arch().dispatch(Sums { assembly: self, m, unknowns });
     }
 }
 

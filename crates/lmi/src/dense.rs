@@ -214,29 +214,37 @@ pub(crate) fn norm(x: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vectorized::tests::with_every_instruction_set;
 
     /// A = 2I + ones·onesᵀ/n, A⁻¹ = I/2 − ones·onesᵀ/(6n).
     #[test]
-    fn factor_and_inverse_on_both_sides_of_the_switch() {
-        for n in [1, 2, 7, SMALL, SMALL + 1, 70] {
-            let size = n as f64;
-            let entry = |i: usize, j: usize| if i == j { 2.0 + 1.0 / size } else { 1.0 / size };
-            let a: Vec<f64> = (0..n * n).map(|at| entry(at % n, at / n)).collect();
-            let mut scratch = Scratch::new(n);
-            let (mut factor, mut inverse) = (a.clone(), vec![0.0; n * n]);
-            assert!(cholesky(n, &mut factor, &mut scratch));
-            inverse_from_factor(n, &factor, &mut inverse, &mut scratch);
-            for i in 0..n {
-                for j in 0..n {
-                    let exact = if i == j { 0.5 } else { 0.0 } - 1.0 / (6.0 * size);
-                    assert!((inverse[i + j * n] - exact).abs() < 1e-14, "{n}");
-                }
+    fn factor_and_inverse_of_every_size() {
+        with_every_instruction_set(|| (1..=SMALL + 2).chain([70]).for_each(factor_and_inverse));
+    }
+
+    fn factor_and_inverse(n: usize) {
+        let size = n as f64;
+        let entry = |i: usize, j: usize| if i == j { 2.0 + 1.0 / size } else { 1.0 / size };
+        let a: Vec<f64> = (0..n * n).map(|at| entry(at % n, at / n)).collect();
+        let mut scratch = Scratch::new(n);
+        let (mut factor, mut inverse) = (a.clone(), vec![0.0; n * n]);
+        assert!(cholesky(n, &mut factor, &mut scratch));
+        inverse_from_factor(n, &factor, &mut inverse, &mut scratch);
+        for i in 0..n {
+            for j in 0..n {
+                let exact = if i == j { 0.5 } else { 0.0 } - 1.0 / (6.0 * size);
+                assert!((inverse[i + j * n] - exact).abs() < 1e-14, "{n}");
             }
-            let mut product = vec![0.0; n * n];
-            multiply(n, &a, &inverse, &mut product, &mut scratch);
-            (0..n).for_each(|i| product[i + i * n] -= 1.0);
-            assert!(norm(&product) < 1e-13);
         }
+        let mut product = vec![0.0; n * n];
+        multiply(n, &a, &inverse, &mut product, &mut scratch);
+        (0..n).for_each(|i| product[i + i * n] -= 1.0);
+        assert!(norm(&product) < 1e-13, "{n}");
+        let mut x: Vec<f64> = (0..n).map(|i| i as f64 - 3.0).collect();
+        let right = x.clone();
+        solve_with_factor(n, &factor, &mut x);
+        let mean = right.iter().sum::<f64>() / size;
+        assert!(x.iter().zip(&right).all(|(x, r)| (x - 0.5 * r + mean / 6.0).abs() < 1e-13 * size), "{n}");
     }
 
     #[test]

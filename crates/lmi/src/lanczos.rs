@@ -5,6 +5,7 @@
 //! two matrix-vector products a step, no eigendecomposition. (Toh, SIAM J. Optim. 12, 2002, for the bound.)
 
 use crate::dense::{apply, axpy, dot};
+use crate::vectorized::arch;
 
 /// Minors below this are scaled up, so that none vanishes for want of exponents.
 const TINY: f64 = 1e-100;
@@ -30,7 +31,7 @@ impl Lanczos {
     ///
     /// Given are S itself, its inverse and D, symmetric n × n.
     pub fn step(&mut self, n: usize, [s, s_inverse, d]: [&[f64]; 3], accuracy: f64) -> f64 {
-        pulp::Arch::new().dispatch(LongestStep { lanczos: self, n, s, s_inverse, d, accuracy })
+        arch().dispatch(LongestStep { lanczos: self, n, s, s_inverse, d, accuracy })
     }
 }
 
@@ -164,6 +165,7 @@ fn inverse_powers(diagonal: &[f64], off: &[f64], lambda: f64, unit: f64) -> Opti
 mod tests {
     use super::*;
     use crate::dense::{Scratch, cholesky, inverse_from_factor};
+    use crate::vectorized::tests::with_every_instruction_set;
     use faer::{Mat, Side};
 
     fn sample(n: usize, seed: u64) -> Vec<f64> {
@@ -180,6 +182,10 @@ mod tests {
     /// Close to the end that the eigenvalues of S⁻¹D give.
     #[test]
     fn step_agrees_with_eigenvalues() {
+        with_every_instruction_set(step_agrees);
+    }
+
+    fn step_agrees() {
         for (n, seed) in [(1, 1), (2, 2), (3, 3), (8, 4), (28, 5), (28, 6), (60, 7)] {
             let (mut s, d) = (sample(n, seed), sample(n, seed + 100));
             (0..n).for_each(|i| s[i + i * n] += 4.0 * (n as f64).sqrt());

@@ -483,6 +483,7 @@ mod tests {
     use super::*;
     use crate::Problem;
     use crate::assembly::Assembly;
+    use crate::vectorized::tests::with_every_instruction_set;
 
     fn patternless(rows: usize, cols: usize) -> Mat<f64> {
         Mat::from_fn(rows, cols, |i, j| ((3 * i + 5 * j + i * j) % 11) as f64 / 7.0 - 0.6)
@@ -527,6 +528,10 @@ mod tests {
     /// The operators of a lowered block against the expression itself.
     #[test]
     fn a_lowered_block_is_its_expression() {
+        with_every_instruction_set(lowered_block);
+    }
+
+    fn lowered_block() {
         let mut problem = Problem::new();
         let (y, l, t) = (problem.symmetric("Y", 3), problem.rectangular("L", 2, 3), problem.scalar("t"));
         let unknowns = [y.terms[0].unknown, l.terms[0].unknown, t.terms[0].unknown];

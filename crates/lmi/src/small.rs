@@ -1,6 +1,8 @@
 //! Kernels on matrices of up to [`MOST`] rows, whose columns fit a few vector registers. Column by column in slices; inner loops run
 //! over columns that are padded to whole vectors.
 
+use crate::vectorized::arch;
+
 /// Most rows.
 pub(crate) const MOST: usize = 40;
 /// Columns are padded to a multiple of this, at least the widest vector register.
@@ -13,17 +15,17 @@ pub(crate) fn scratch(n: usize) -> Vec<f64> {
 
 /// c = a · b.
 pub(crate) fn multiply(n: usize, a: &[f64], b: &[f64], c: &mut [f64], padded: &mut [f64]) {
-    pulp::Arch::new().dispatch(Multiply { n, a, b, c, padded });
+    arch().dispatch(Multiply { n, a, b, c, padded });
 }
 
 /// (L Lᵀ)⁻¹ as a full symmetric matrix, from the lower triangle L.
 pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], padded: &mut [f64]) {
-    pulp::Arch::new().dispatch(Inverse { n, l, out, padded });
+    arch().dispatch(Inverse { n, l, out, padded });
 }
 
 /// Replaces the lower triangle of `a` by its Cholesky factor. False when `a` is not positive definite (or not finite).
 pub(crate) fn cholesky(n: usize, a: &mut [f64], padded: &mut [f64]) -> bool {
-    pulp::Arch::new().dispatch(Cholesky { n, a, padded })
+    arch().dispatch(Cholesky { n, a, padded })
 }
 
 /// Calls a method with the number of vectors in a column known to the compiler, so that they stay in registers.
@@ -62,8 +64,10 @@ impl pulp::WithSimd for Multiply<'_> {
         let height = stride / S::F64_LANES;
         // As many accumulators as there are registers for.
         let panel = if S::F64_LANES == 8 { 4 } else { 3 };
-        for first in (0..height).step_by(panel) {
-            let rows = panel.min(height - first);
+        // The padding may end with vectors that hold no row.
+        let filled = n.div_ceil(S::F64_LANES);
+        for first in (0..filled).step_by(panel).rev() {
+            let rows = panel.min(filled - first);
             let panel = Panel { n, height, first, columns };
             let mut column = 0;
             while column + 4 <= n {
@@ -127,18 +131,22 @@ impl<V: Copy> Panel<'_, V> {
             }
         }
         for (j, sums) in sums.iter().enumerate() {
-            let target = &mut c[(column + j) * n..(column + j + 1) * n];
-            store::<S, M>(sums, &mut target[self.first * S::F64_LANES..]);
+            store::<S, M>(sums, c, (column + j) * n + self.first * S::F64_LANES, (column + j + 1) * n);
         }
     }
 }
 
-/// Writes vectors to a slice that may end before they do.
+/// Writes vectors from `start` on, to `end` or beyond: columns are written in their order, the lowest rows of all of them first, so that what
+/// follows is not lost. Behind the last column there is nothing to write to.
 #[inline(always)]
-fn store<S: pulp::Simd, const M: usize>(vectors: &[S::f64s; M], target: &mut [f64]) {
+fn store<S: pulp::Simd, const M: usize>(vectors: &[S::f64s; M], target: &mut [f64], start: usize, end: usize) {
+    let whole = start + M * S::F64_LANES;
+    if whole <= target.len() {
+        S::as_mut_simd_f64s(&mut target[start..whole]).0.copy_from_slice(vectors);
+        return;
+    }
     let values: &[f64] = pulp::bytemuck::cast_slice(&vectors[..]);
-    let len = target.len().min(values.len());
-    target[..len].copy_from_slice(&values[..len]);
+    target[start..end].copy_from_slice(&values[..end - start]);
 }
 
 struct Inverse<'a> {
@@ -196,7 +204,7 @@ impl Inverse<'_> {
                 }
             }
             for (at, sums) in [column, second].into_iter().zip(&sums) {
-                store::<S, H>(sums, &mut out[at * n..(at + 1) * n]);
+                store::<S, H>(sums, out, at * n, (at + 1) * n);
             }
             column += 2;
         }

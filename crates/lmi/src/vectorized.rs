@@ -20,7 +20,7 @@ macro_rules! vectorized {
                     $body
                 }
             }
-            pulp::Arch::new().dispatch(Kernel { $($argument),* })
+            $crate::vectorized::arch().dispatch(Kernel { $($argument),* })
         }
     };
     (@output) => { () };
@@ -28,3 +28,67 @@ macro_rules! vectorized {
 }
 
 pub(crate) use vectorized;
+
+/// The best instruction set of this machine.
+#[cfg(not(test))]
+#[inline]
+pub(crate) fn arch() -> pulp::Arch {
+    pulp::Arch::new()
+}
+
+#[cfg(test)]
+pub(crate) use tests::arch;
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use crate::{Expr, Mat, Options, Outcome, Problem};
+    use std::cell::Cell;
+
+    thread_local! {
+        static FORCED: Cell<Option<pulp::Arch>> = const { Cell::new(None) };
+    }
+
+    /// The instruction set that a test asks for, otherwise the best one.
+    pub fn arch() -> pulp::Arch {
+        FORCED.get().unwrap_or_default()
+    }
+
+    /// Every instruction set that this machine has.
+    fn all() -> Vec<pulp::Arch> {
+        let mut all = vec![pulp::Arch::Scalar];
+        #[cfg(target_arch = "x86_64")]
+        {
+            all.extend(pulp::x86::V3::try_new().map(pulp::Arch::V3));
+            all.extend(pulp::x86::V4::try_new().map(pulp::Arch::V4));
+        }
+        all
+    }
+
+    /// Runs a test with one instruction set after the other.
+    pub fn with_every_instruction_set(test: impl Fn()) {
+        for set in all() {
+            FORCED.set(Some(set));
+            test();
+        }
+        FORCED.set(None);
+    }
+
+    /// Blocks of 1 to 33 rows, whole vectors or not: −AY − YAᵀ ≻ 0, Y ⪯ I for A = −I + N has the optimum tr Y = n.
+    #[test]
+    fn solves_with_every_instruction_set() {
+        with_every_instruction_set(|| {
+            for n in (1..=12).chain([17, 33]) {
+                let mut problem = Problem::new();
+                let y = problem.symmetric("Y", n);
+                let a = Mat::from_fn(n, n, |i, j| f64::from(i8::from(j == i + 1)) - f64::from(u8::from(i == j)));
+                let flow = &a * &y;
+                problem.positive_definite("stability", -(&flow + flow.t()));
+                problem.positive_definite("bound", Expr::identity(n) - &y);
+                problem.maximize(&y.trace());
+                let answer = problem.solve(&Options::default()).unwrap();
+                assert!(matches!(answer.outcome, Outcome::Solved), "{n}: {:?}", answer.outcome);
+                assert!((answer.objective / n as f64 - 1.0).abs() < 1e-6, "{n}: {}", answer.objective);
+            }
+        });
+    }
+}
