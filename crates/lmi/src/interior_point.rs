@@ -457,8 +457,7 @@ impl<'a> Iteration<'a> {
     fn predict_and_correct(&mut self, status: &Status) -> (f64, f64, f64) {
         let feasible = self.feasible;
         self.blocks.iter_mut().for_each(|state| state.begin_predictor(feasible, &mut self.scratch));
-        // What the predictor tells needs few digits.
-        self.direction(Schur::solve_once);
+        self.direction();
         let (primal, dual) = self.longest_steps(0.3);
         let (primal, dual) = (primal.min(1.0), dual.min(1.0));
         let reached: f64 = self.blocks.iter().map(|b| b.complementarity(primal, dual)).sum::<f64>() / self.order;
@@ -466,19 +465,20 @@ impl<'a> Iteration<'a> {
         let exponent = (3.0 * primal.min(dual).powi(2)).max(1.0);
         let sigma = ratio.powf(exponent).clamp(1e-6, 1.0);
         self.blocks.iter_mut().for_each(|state| state.begin_corrector(sigma * status.mu, &mut self.scratch));
-        self.direction(Schur::solve);
+        self.direction();
         (sigma, primal, dual)
     }
 
-    /// dx, dS and dZ for the right side that the blocks hold.
-    fn direction(&mut self, solve: fn(&mut Schur, &[f64], &mut [f64])) {
+    /// dx, dS and dZ for the right side that the blocks hold. What the predictor tells needs few digits, and the corrector is refined against
+    /// the equations themselves.
+    fn direction(&mut self) {
         self.right_side.fill(0.0);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.add_right_side(block, &mut self.right_side);
         }
         scale_by(self.scale, &mut self.right_side);
         crate::dense::axpy(-1.0, self.objective, &mut self.right_side);
-        solve(&mut self.schur, &self.right_side, &mut self.dx);
+        self.schur.solve_once(&self.right_side, &mut self.dx);
         product(self.scale, &self.dx, &mut self.unscaled);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.complete(block, &self.unscaled, self.feasible, &mut self.scratch);
