@@ -236,10 +236,9 @@ impl Sdp {
             }
             let coefficients = merge(entries);
             let factored = structure::stacks(size, &coefficients).map(|stacks| Factored::new(size, stacks));
-            let sparse = Sparse::of_coefficients(size, coefficients);
             let (factored, sparse) = match factored {
-                Some(factored) if factored.cost() < sparse.cost => (factored, Sparse::default()),
-                _ => (Factored::default(), sparse),
+                Some(factored) if factored.cost() < Sparse::cost(size, &coefficients) => (factored, Sparse::default()),
+                _ => (Factored::default(), Sparse::of_coefficients(size, coefficients)),
             };
             Block::Dense(DenseBlock { size, constant, factored, sparse })
         });

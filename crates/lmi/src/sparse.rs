@@ -67,8 +67,6 @@ pub(crate) struct Sparse {
     coefficients: Vec<Coefficient>,
     /// All entries in that order, as ⟨F, H⟩ for symmetric H needs them: (place in the lower triangle of H, value, doubled off the diagonal).
     weights: Vec<(u32, f64)>,
-    /// Operations that a Schur complement takes, roughly.
-    pub cost: usize,
 }
 
 /// The coefficient matrix of each unknown that has one, as (row, column, value), row ≥ column, by rising column and row.
@@ -105,6 +103,12 @@ pub(crate) struct SparseScratch {
     pub h: Vec<f64>,
 }
 
+/// Operations for the row of one unknown, by the whole product, counted by vectors of about six, and by the entries that are asked for: of
+/// `support` rows, with so many entries of its own and of the unknowns after it.
+fn operations(n: usize, support: usize, entries: usize) -> (usize, usize) {
+    (n * n * (support + 6) / 6 + entries, 2 * support * entries)
+}
+
 impl Sparse {
     /// From entries in any order; repeated entries add up.
     pub fn new(n: usize, entries: Vec<Entry>) -> Self {
@@ -131,21 +135,43 @@ impl Sparse {
         coefficients.sort_by_key(|c| std::cmp::Reverse(c.entries.len()));
         let mut remaining: usize = coefficients.iter().map(|c| c.entries.len()).sum();
         let mut weights = Vec::with_capacity(remaining);
-        let mut cost = 0;
         for c in &mut coefficients {
-            let k = c.support.len();
-            // Operations, those of the dense product counted by vectors of about six.
-            let (whole, entrywise) = (n * n * (k + 6) / 6 + remaining, 2 * k * remaining);
+            let (whole, entrywise) = operations(n, c.support.len(), remaining);
             c.whole = whole < entrywise;
-            // Single entries cost about twice what they count.
-            cost += c.full.len() * n / 6 + if c.whole { whole } else { 2 * entrywise };
             remaining -= c.entries.len();
             c.start = weights.len();
             let weight =
                 |&(i, j, value): &(usize, usize, f64)| ((i + j * n) as u32, if i == j { value } else { 2.0 * value });
             weights.extend(c.entries.iter().map(weight));
         }
-        Self { n, coefficients, weights, cost }
+        Self { n, coefficients, weights }
+    }
+
+    /// Operations that a Schur complement of these coefficient matrices takes, roughly.
+    pub fn cost(n: usize, coefficients: &Coefficients) -> usize {
+        let mut seen = vec![0; n];
+        let mut sizes: Vec<[usize; 3]> = Vec::with_capacity(coefficients.len());
+        for (at, (_, entries)) in coefficients.iter().enumerate() {
+            let (mut support, mut full) = (0, 0);
+            for &(i, j, _) in entries {
+                full += if i == j { 1 } else { 2 };
+                for row in [i, j] {
+                    support += usize::from(seen[row] != at + 1);
+                    seen[row] = at + 1;
+                }
+            }
+            sizes.push([entries.len(), support, full]);
+        }
+        sizes.sort_by_key(|[count, ..]| std::cmp::Reverse(*count));
+        let mut remaining: usize = sizes.iter().map(|[count, ..]| count).sum();
+        let mut cost = 0;
+        for [count, support, full] in sizes {
+            let (whole, entrywise) = operations(n, support, remaining);
+            // Single entries cost about twice what they count.
+            cost += full * n / 6 + if whole < entrywise { whole } else { 2 * entrywise };
+            remaining -= count;
+        }
+        cost
     }
 
     pub fn is_empty(&self) -> bool {
