@@ -5,6 +5,7 @@
 //! or the unknowns by linear combinations, so that scaling matters for the starting point and the stopping rule only.
 
 mod certificate;
+mod refinement;
 
 use crate::answer::{InaccurateReason, IterationLog, Residuals};
 use crate::assembly::Assembly;
@@ -41,12 +42,6 @@ const NOISE: f64 = 1e-6;
 /// Where regularisation of such a direction begins, relative to the diagonal of M, and ends.
 const LEAST_REGULARIZATION: f64 = 1e-15;
 const MOST_REGULARIZATION: f64 = 1e-11;
-/// Rounds of refinement of one direction at most.
-const REFINEMENTS: usize = 10;
-/// Dual residual of a direction, against the tolerance, from which on Z + dZ is projected, and rounds of that.
-const MISSED: f64 = 0.1;
-const PROJECTIONS: usize = 4;
-
 /// A point of the iteration.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Point {
@@ -425,9 +420,7 @@ impl<'a> Iteration<'a> {
             }
             regularization = (100.0 * self.schur.regularization).max(LEAST_REGULARIZATION);
         }
-        if left > MISSED * self.options.feasibility_tolerance {
-            self.project(left);
-        }
+        self.project(left);
         let fraction = 0.9 + 0.098 * primal.min(dual);
         // As accurate as what is left to the boundary: close to the optimum the step decides how far the gap falls.
         let (primal, dual) = self.longest_steps(0.5 * (1.0 - fraction));
@@ -482,75 +475,6 @@ impl<'a> Iteration<'a> {
         product(self.scale, &self.dx, &mut self.unscaled);
         for (state, block) in self.blocks.iter_mut().zip(self.operators) {
             state.complete(block, &self.unscaled, self.feasible, &mut self.scratch);
-        }
-    }
-
-    /// Iterative refinement of the direction against the dual equations A(Z + dZ) = c themselves: close to the optimum S⁻¹ is
-    /// large, and what rounding leaves of the equations in `sym(P F(dx) Z)` would otherwise add up in Z.
-    /// Gives the dual residual at Z + dZ.
-    fn refine(&mut self) -> f64 {
-        let mut last = f64::INFINITY;
-        for _ in 0..REFINEMENTS {
-            let size = self.miss();
-            if size.is_nan() || size <= 1e-3 * self.options.feasibility_tolerance || size > 0.9 * last {
-                return size;
-            }
-            last = size;
-            self.right_side.iter_mut().for_each(|r| *r = -*r);
-            self.schur.solve(&self.right_side, &mut self.change);
-            // A correction larger than the direction itself is noise.
-            if norm(&self.change) > norm(&self.dx) {
-                return size;
-            }
-            crate::dense::axpy(1.0, &self.change, &mut self.dx);
-            product(self.scale, &self.change, &mut self.unscaled);
-            for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-                state.refine(block, &self.unscaled, &mut self.scratch);
-            }
-        }
-        last
-    }
-
-    /// `right_side` ← c − A(Z + dZ); gives its relative size.
-    fn miss(&mut self) -> f64 {
-        self.right_side.fill(0.0);
-        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-            state.subtract_dual(block, &mut self.right_side);
-        }
-        scale_by(self.scale, &mut self.right_side);
-        crate::dense::axpy(1.0, self.objective, &mut self.right_side);
-        self.right_side.iter().fold(0.0, |m, r| nan_max(m, r.abs())) / (1.0 + self.objective_norm)
-    }
-
-    /// Moves Z + dZ towards A(Z) = c by Z F(y) Z, for a y from the equations with Z in place of S⁻¹: what rounding leaves of the direction
-    /// in degenerate problems comes from the large S⁻¹, which has no part in this. Relative to Z the change is small. It takes the place of M.
-    fn project(&mut self, left: f64) {
-        self.assemble(|state| [&state.z, &state.z]);
-        if !self.schur.factorize(0.0) {
-            return;
-        }
-        let mut last = left;
-        for _ in 0..PROJECTIONS {
-            self.miss();
-            self.schur.solve(&self.right_side, &mut self.change);
-            product(self.scale, &self.change, &mut self.unscaled);
-            self.move_dual();
-            let size = self.miss();
-            if size.is_nan() || size > last {
-                self.unscaled.iter_mut().for_each(|y| *y = -*y);
-                self.move_dual();
-            }
-            if size.is_nan() || size > 0.5 * last {
-                return;
-            }
-            last = size;
-        }
-    }
-
-    /// dZ ← dZ + Z F(y) Z for the y in `unscaled`.
-    fn move_dual(&mut self) {
-        for (state, block) in self.blocks.iter_mut().zip(self.operators) {
-            state.move_dual(block, &self.unscaled, &mut self.scratch);
         }
     }
 
