@@ -34,7 +34,6 @@ const UNATTAINED: f64 = 2e4;
 const NEAR: f64 = 1e-2;
 /// A multiplier is a witness of infeasibility when its residual is this small against the dual objective: rounding level.
 const CERTIFICATE: f64 = 1e-14;
-
 /// From here on it is tried to complete a multiplier to an exact witness.
 const NEAR_CERTIFICATE: f64 = 1e-3;
 /// Dual residual of a direction from which on it is suspected to be noise.
@@ -42,6 +41,7 @@ const NOISE: f64 = 1e-6;
 /// Where regularisation of such a direction begins, relative to the diagonal of M, and ends.
 const LEAST_REGULARIZATION: f64 = 1e-15;
 const MOST_REGULARIZATION: f64 = 1e-11;
+
 /// A point of the iteration.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Point {

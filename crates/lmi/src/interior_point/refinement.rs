@@ -1,6 +1,7 @@
 //! What rounding leaves of a direction in the dual equations.
 
 use super::{Iteration, nan_max, product, scale_by};
+use crate::Options;
 use crate::dense::{axpy, norm};
 
 /// Rounds of refinement of one direction at most.
@@ -14,10 +15,12 @@ impl Iteration<'_> {
     /// large, and what rounding leaves of the equations in `sym(P F(dx) Z)` would otherwise add up in Z.
     /// Gives the dual residual at Z + dZ.
     pub(super) fn refine(&mut self) -> f64 {
+        let Options { feasibility_tolerance, gap_tolerance, .. } = *self.options;
+        let enough = (1e-3 * feasibility_tolerance).min(1e-2 * gap_tolerance);
         let mut last = f64::INFINITY;
         for _ in 0..REFINEMENTS {
             let size = self.miss();
-            if size.is_nan() || size <= 1e-3 * self.options.feasibility_tolerance || size > 0.9 * last {
+            if size.is_nan() || size <= enough || size > 0.9 * last {
                 return size;
             }
             last = size;
