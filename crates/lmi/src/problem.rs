@@ -290,12 +290,8 @@ impl Original for Stated<'_> {
 
     fn known_product(&self, block: usize, z: &Mat<f64>) -> SumOfProducts {
         let constant = &self.problem.inequalities[block].expression.constant;
-        let mut sum = SumOfProducts::default();
-        for j in 0..z.ncols() {
-            let entries = constant.col_as_slice(j).iter().zip(z.col_as_slice(j));
-            entries.filter(|(c, _)| **c != 0.0).for_each(|(c, z)| sum.add(*c, *z));
-        }
-        sum
+        let entries = (0..z.ncols()).flat_map(|j| constant.col_as_slice(j).iter().zip(z.col_as_slice(j)));
+        SumOfProducts::of(entries.filter(|(c, _)| **c != 0.0).map(|(c, z)| (*c, *z)))
     }
 
     fn objective(&self, values: &[Mat<f64>]) -> f64 {

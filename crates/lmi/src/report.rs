@@ -212,8 +212,7 @@ fn at_zero(original: &dyn Original, blocks: &[BlockReport], z: &[Mat<f64>]) -> A
     let mut sum = AtZero { total: 0.0, known: 0.0, magnitude: 0.0, error: 0.0 };
     for (index, (block, z)) in blocks.iter().zip(z).enumerate() {
         let known = original.known_product(index, z);
-        let mut margin = SumOfProducts::default();
-        (0..block.size).for_each(|i| margin.add(block.margin, z[(i, i)]));
+        let margin = SumOfProducts::of((0..block.size).map(|i| (block.margin, z[(i, i)])));
         sum.magnitude += known.magnitude;
         sum.error += known.error() + margin.error();
         let total = known.value() - margin.value();

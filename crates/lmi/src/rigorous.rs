@@ -54,13 +54,7 @@ impl Enclosure {
 
     /// Of a symmetric expression at the unknowns given, its symmetric part.
     pub fn of_expression<'a>(expression: &Expr, value_of: &dyn Fn(Unknown) -> &'a Mat<f64>) -> Self {
-        let n = expression.nrows();
-        let mut sum = Self::zeros(n, false);
-        for j in 0..n {
-            for i in 0..n {
-                sum.add_product(i, j, expression.constant[(i, j)], 1.0);
-            }
-        }
+        let mut sum = Self::of_entries(&expression.constant);
         for term in expression.terms.iter() {
             sum.add_term(&term.shape, value_of(term.unknown));
         }
@@ -70,29 +64,22 @@ impl Enclosure {
 
     /// Of a known matrix, its symmetric part.
     pub fn of_matrix(matrix: &Mat<f64>) -> Self {
-        let n = matrix.nrows();
-        let mut sum = Self::zeros(n, false);
-        for j in 0..n {
-            for i in 0..n {
-                sum.add_product(i, j, matrix[(i, j)], 1.0);
-            }
-        }
+        let mut sum = Self::of_entries(matrix);
         sum.symmetrize();
         sum
     }
 
-    /// Adds a·b to entry (i, j).
-    pub fn add_product(&mut self, i: usize, j: usize, a: f64, b: f64) {
-        let at = if self.diagonal { i } else { i + j * self.n };
-        let sum = dd::add(Double { h: self.high[at], l: self.low[at] }, dd::two_product(a, b));
-        (self.high[at], self.low[at]) = (sum.h, sum.l);
-        self.magnitude[at] += (a * b).abs();
-        self.factor = self.factor.max(a.abs()).max(b.abs());
+    /// Of a known square matrix as it is.
+    fn of_entries(matrix: &Mat<f64>) -> Self {
+        let high = columns(matrix);
+        let magnitude = high.iter().map(|entry| entry.abs()).collect();
+        let factor = crate::verification::largest_entry(matrix).max(1.0);
+        Self { high, magnitude, factor, ..Self::zeros(matrix.nrows(), false) }
     }
 
-    /// Counts terms added one by one with [`Self::add_product`].
-    pub fn count(&mut self, terms: usize) {
-        self.roundings += terms as f64;
+    /// Adds products a·b to entries (i, j), given as (i, j, a, b).
+    pub fn add_products(&mut self, mut products: impl Iterator<Item = (usize, usize, f64, f64)>) {
+        add_products(self, &mut products);
     }
 
     fn add_term(&mut self, shape: &Shape, x: &Mat<f64>) {
@@ -115,22 +102,8 @@ impl Enclosure {
                 self.roundings += (r + c + 4) as f64;
             }
             Shape::Scaled { weights, matrix } => {
-                let (mut sum, mut magnitude) = (Double::default(), 0.0);
-                for j in 0..weights.ncols() {
-                    for i in 0..weights.nrows() {
-                        sum = dd::add(sum, dd::two_product(weights[(i, j)], x[(i, j)]));
-                        magnitude += (weights[(i, j)] * x[(i, j)]).abs();
-                    }
-                }
-                for j in 0..n {
-                    for i in 0..n {
-                        let at = i + j * n;
-                        let term = dd::multiply_by(sum, matrix[(i, j)]);
-                        let total = dd::add(Double { h: self.high[at], l: self.low[at] }, term);
-                        (self.high[at], self.low[at]) = (total.h, total.l);
-                        self.magnitude[at] += magnitude * matrix[(i, j)].abs();
-                    }
-                }
+                let sum = SumOfProducts::of(columns(weights).into_iter().zip(columns(x)));
+                add_multiple(sum, &columns(matrix), [&mut self.high, &mut self.low, &mut self.magnitude]);
                 self.factor = self.factor.max(largest(weights)).max(largest(x)).max(largest(matrix));
                 self.roundings += (weights.nrows() * weights.ncols() + 4) as f64;
             }
@@ -280,13 +253,9 @@ pub(crate) struct SumOfProducts {
 }
 
 impl SumOfProducts {
-    /// Adds a·b.
-    pub fn add(&mut self, a: f64, b: f64) {
-        let term = dd::two_product(a, b);
-        self.sum = dd::add(self.sum, term);
-        self.magnitude += term.h.abs();
-        self.terms += 1;
-        self.factor = self.factor.max(a.abs()).max(b.abs());
+    /// Of a·b for every pair.
+    pub fn of(mut pairs: impl Iterator<Item = (f64, f64)>) -> Self {
+        sum_of_products(&mut pairs)
     }
 
     /// The sum, rounded.
@@ -337,19 +306,8 @@ impl Gradient {
                         roundings += (2 * n + 4) as f64;
                     }
                     Shape::Scaled { weights, matrix } => {
-                        let (mut inner, mut sum) = (Double::default(), 0.0);
-                        for j in 0..n {
-                            for i in 0..n {
-                                inner = dd::add(inner, dd::two_product(matrix[(i, j)], z[(i, j)]));
-                                sum += (matrix[(i, j)] * z[(i, j)]).abs();
-                            }
-                        }
-                        let [high, low, magnitude] = sums;
-                        for (k, weight) in columns(weights).into_iter().enumerate() {
-                            let value = dd::add(Double { h: high[k], l: low[k] }, dd::multiply_by(inner, weight));
-                            (high[k], low[k]) = (value.h, value.l);
-                            magnitude[k] += sum * weight.abs();
-                        }
+                        let sum = SumOfProducts::of(columns(matrix).into_iter().zip(columns(z)));
+                        add_multiple(sum, &columns(weights), sums);
                         factor = factor.max(size(weights)).max(size(matrix)).max(size(z));
                         roundings += (n * n + 4) as f64;
                     }
@@ -394,6 +352,46 @@ fn powers(exponents: &[i32]) -> Option<Vec<f64>> {
 fn scaled(value: f64, exponent: i32) -> f64 {
     let half = exponent / 2;
     value * 2.0_f64.powi(half) * 2.0_f64.powi(exponent - half)
+}
+
+vectorized! {
+    fn add_products<'a>(sum: &'a mut Enclosure, products: &'a mut dyn Iterator<Item = (usize, usize, f64, f64)>) {
+        for (i, j, a, b) in products {
+            let at = if sum.diagonal { i } else { i + j * sum.n };
+            let entry = dd::add(Double { h: sum.high[at], l: sum.low[at] }, dd::two_product(a, b));
+            (sum.high[at], sum.low[at]) = (entry.h, entry.l);
+            sum.magnitude[at] += (a * b).abs();
+            sum.factor = sum.factor.max(a.abs()).max(b.abs());
+            // Every entry has fewer terms than all of them together.
+            sum.roundings += 1.0;
+        }
+    }
+}
+
+vectorized! {
+    fn sum_of_products<'a>(pairs: &'a mut dyn Iterator<Item = (f64, f64)>) -> SumOfProducts {
+        let mut all = SumOfProducts::default();
+        for (a, b) in pairs {
+            let term = dd::two_product(a, b);
+            all.sum = dd::add(all.sum, term);
+            all.magnitude += term.h.abs();
+            all.terms += 1;
+            all.factor = all.factor.max(a.abs()).max(b.abs());
+        }
+        all
+    }
+}
+
+vectorized! {
+    /// sums ← sums + factor · matrix, and the same of absolute values.
+    fn add_multiple<'a>(factor: SumOfProducts, matrix: &'a [f64], sums: [&'a mut [f64]; 3]) {
+        let [high, low, magnitude] = sums;
+        for (((high, low), magnitude), entry) in high.iter_mut().zip(low).zip(magnitude).zip(matrix) {
+            let value = dd::add(Double { h: *high, l: *low }, dd::multiply_by(factor.sum, *entry));
+            (*high, *low) = (value.h, value.l);
+            *magnitude += factor.magnitude * entry.abs();
+        }
+    }
 }
 
 vectorized! {

@@ -69,6 +69,14 @@ pub struct Coefficient {
     pub value: f64,
 }
 
+impl Coefficient {
+    /// Where the entry stands: on the diagonal once, elsewhere with its mirror image.
+    fn places(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let mirrored = (self.row != self.column).then_some((self.column, self.row));
+        std::iter::once((self.row, self.column)).chain(mirrored)
+    }
+}
+
 /// A problem `minimise cᵀx subject to Σ xᵢFᵢ − F₀ ⪰ 0`, coefficient by coefficient.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sdp {
@@ -278,14 +286,7 @@ impl Original for Stated<'_> {
         let mut value = Mat::zeros(shape.size(), if diagonal { 1 } else { shape.size() });
         for c in self.sdp.coefficients.iter().filter(|c| c.block == block) {
             let term = c.unknown.map_or(-c.value, |unknown| c.value * values[0][(unknown, 0)]);
-            if diagonal {
-                value[(c.row, 0)] += term;
-            } else {
-                value[(c.row, c.column)] += term;
-                if c.row != c.column {
-                    value[(c.column, c.row)] += term;
-                }
-            }
+            c.places().for_each(|(row, column)| value[(row, if diagonal { 0 } else { column })] += term);
         }
         value
     }
@@ -293,29 +294,16 @@ impl Original for Stated<'_> {
     fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure {
         let shape = self.sdp.blocks[block];
         let mut sum = Enclosure::zeros(shape.size(), matches!(shape, BlockShape::Diagonal(_)));
-        let mut terms = 0;
-        for c in self.sdp.coefficients.iter().filter(|c| c.block == block) {
+        sum.add_products(self.sdp.coefficients.iter().filter(|c| c.block == block).flat_map(|c| {
             let x = c.unknown.map_or(-1.0, |unknown| values[0][(unknown, 0)]);
-            sum.add_product(c.row, c.column, c.value, x);
-            if c.row != c.column {
-                sum.add_product(c.column, c.row, c.value, x);
-            }
-            terms += 1;
-        }
-        // Every entry has at most one term of each matrix unless entries are repeated.
-        sum.count(terms);
+            c.places().map(move |(row, column)| (row, column, c.value, x))
+        }));
         sum
     }
 
     fn known_product(&self, block: usize, z: &Mat<f64>) -> SumOfProducts {
-        let mut sum = SumOfProducts::default();
-        for c in self.sdp.coefficients.iter().filter(|c| c.block == block && c.unknown.is_none()) {
-            sum.add(-c.value, z[(c.row, c.column)]);
-            if c.row != c.column {
-                sum.add(-c.value, z[(c.column, c.row)]);
-            }
-        }
-        sum
+        let known = self.sdp.coefficients.iter().filter(|c| c.block == block && c.unknown.is_none());
+        SumOfProducts::of(known.flat_map(|c| c.places().map(|place| (-c.value, z[place]))))
     }
 
     fn objective(&self, values: &[Mat<f64>]) -> f64 {
@@ -328,16 +316,12 @@ impl Original for Stated<'_> {
 
     fn gradient_bounds(&self, multipliers: &[Mat<f64>], offset: Option<&[f64]>) -> Vec<f64> {
         let mut gradient = Enclosure::zeros(self.sdp.objective.len(), true);
-        for (unknown, offset) in offset.unwrap_or_default().iter().enumerate() {
-            gradient.add_product(unknown, unknown, -1.0, *offset);
-        }
-        for c in &self.sdp.coefficients {
-            if let Some(unknown) = c.unknown {
-                let count = if c.row == c.column { 1.0 } else { 2.0 };
-                gradient.add_product(unknown, unknown, count * c.value, multipliers[c.block][(c.row, c.column)]);
-            }
-        }
-        gradient.count(self.sdp.coefficients.len() + 1);
+        let offsets = offset.unwrap_or_default().iter().enumerate().map(|(k, offset)| (k, k, -1.0, *offset));
+        let products = self.sdp.coefficients.iter().filter_map(|c| {
+            let (k, count) = (c.unknown?, if c.row == c.column { 1.0 } else { 2.0 });
+            Some((k, k, count * c.value, multipliers[c.block][(c.row, c.column)]))
+        });
+        gradient.add_products(offsets.chain(products));
         gradient.absolute_bounds()
     }
 

@@ -9,6 +9,7 @@
 use crate::factored::{NO_UNKNOWN, Stack};
 use crate::sparse::Coefficients;
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 /// Grids filled less than this are not worth their empty places.
 const LEAST_FILL: f64 = 0.3;
@@ -17,49 +18,92 @@ const ROUNDINGS: f64 = 4.0;
 
 /// A sparse vector by rising index.
 type Vector = Vec<(usize, f64)>;
-type Key = Vec<(usize, u64)>;
 
-fn key(vector: &[(usize, f64)]) -> Key {
-    vector.iter().map(|&(i, value)| (i, value.to_bits())).collect()
+/// Sum of hashes of the entries: what is left without one of them is a difference away.
+fn hash(vector: &[(usize, f64)]) -> u64 {
+    vector.iter().fold(0, |sum, entry| sum.wrapping_add(hash_of_entry(*entry)))
+}
+
+/// Well mixed by two rounds of multiplication and shift.
+fn hash_of_entry((index, value): (usize, f64)) -> u64 {
+    let mixed = (index as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ value.to_bits();
+    let mixed = (mixed ^ (mixed >> 32)).wrapping_mul(0xD6E8_FEB8_6659_FD93);
+    (mixed ^ (mixed >> 32)).wrapping_mul(0xD6E8_FEB8_6659_FD93)
+}
+
+/// The same bits, entry by entry.
+fn same<'a>(a: impl Iterator<Item = &'a (usize, f64)>, b: &[(usize, f64)]) -> bool {
+    a.map(|(i, value)| (*i, value.to_bits())).eq(b.iter().map(|(i, value)| (*i, value.to_bits())))
 }
 
 /// The vectors that coefficients share.
 #[derive(Default)]
 struct Library {
     vectors: Vec<Vector>,
-    whole: HashMap<Key, usize>,
-    /// By what is left without the entry at an index.
-    without: HashMap<(usize, Key), Vec<usize>>,
+    /// By their hashes.
+    whole: HashMap<u64, Vec<usize>, Hashed>,
+    /// By the index of an entry, and the hash of what is left without it: the vector and the place of the entry.
+    without: HashMap<u64, Vec<(usize, usize)>, Hashed>,
+}
+
+/// Keys are hashes themselves.
+type Hashed = BuildHasherDefault<Same>;
+
+#[derive(Default)]
+struct Same(u64);
+
+impl Hasher for Same {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.0 = self.0.rotate_left(8) ^ u64::from(*byte));
+    }
+
+    fn write_u64(&mut self, key: u64) {
+        self.0 = key;
+    }
+}
+
+/// Of an index and the hash of the rest.
+fn with_index(index: usize, rest: u64) -> u64 {
+    rest.rotate_left(1) ^ hash_of_entry((index, 0.0))
 }
 
 impl Library {
     fn find(&self, vector: &[(usize, f64)]) -> Option<usize> {
-        self.whole.get(&key(vector)).copied()
+        let same_hash = self.whole.get(&hash(vector))?;
+        same_hash.iter().copied().find(|&id| same(self.vectors[id].iter(), vector))
     }
 
-    fn insert(&mut self, vector: Vector) -> usize {
-        if let Some(id) = self.find(&vector) {
+    fn insert(&mut self, vector: &[(usize, f64)]) -> usize {
+        if let Some(id) = self.find(vector) {
             return id;
         }
-        let id = self.vectors.len();
-        self.whole.insert(key(&vector), id);
-        for at in 0..vector.len() {
-            let mut rest = key(&vector);
-            let (index, _) = rest.remove(at);
-            self.without.entry((index, rest)).or_default().push(id);
+        let (id, all) = (self.vectors.len(), hash(vector));
+        self.whole.entry(all).or_default().push(id);
+        for (at, entry) in vector.iter().enumerate() {
+            let rest = all.wrapping_sub(hash_of_entry(*entry));
+            self.without.entry(with_index(entry.0, rest)).or_default().push((id, at));
         }
-        self.vectors.push(vector);
+        self.vectors.push(vector.to_vec());
         id
     }
 
     /// Vectors that are `vector` but for an entry at `index`, with that entry.
-    fn completions(&self, vector: &[(usize, f64)], index: usize) -> Vec<(usize, f64)> {
-        let same = self.find(vector).map(|id| (id, 0.0));
-        let others = self.without.get(&(index, key(vector))).into_iter().flatten().filter_map(|&id| {
-            let entry = self.vectors[id].iter().find(|(i, _)| *i == index)?;
-            Some((id, entry.1))
-        });
-        same.into_iter().chain(others).collect()
+    fn completions<'a>(
+        &'a self,
+        vector: &'a [(usize, f64)],
+        index: usize,
+    ) -> impl Iterator<Item = (usize, f64)> + Clone + 'a {
+        let whole = self.find(vector).map(|id| (id, 0.0));
+        let others = self.without.get(&with_index(index, hash(vector))).into_iter().flatten();
+        let fits = move |&&(id, at): &&(usize, usize)| {
+            let candidate = &self.vectors[id];
+            candidate[at].0 == index && same(candidate[..at].iter().chain(&candidate[at + 1..]), vector)
+        };
+        whole.into_iter().chain(others.filter(fits).map(|&(id, at)| (id, self.vectors[id][at].1)))
     }
 }
 
@@ -91,10 +135,11 @@ pub(crate) fn stacks(n: usize, coefficients: &Coefficients) -> Option<Vec<Stack>
     let mut library = Library::default();
     let mut popularity = vec![0_usize; n];
     let mut terms = Vec::new();
+    let mut partners = [Vector::new(), Vector::new()];
     // What can be read in one way only comes first.
     open.retain(|c| match c.stars[..] {
         [centre] => {
-            let vector = library.insert(c.partner(centre, None));
+            let vector = library.insert(c.partner(centre, None, &mut partners[0]));
             popularity[centre] += 1;
             terms.push(Term { vector, centre, unknown: c.unknown });
             false
@@ -104,15 +149,15 @@ pub(crate) fn stacks(n: usize, coefficients: &Coefficients) -> Option<Vec<Stack>
     let enough = |library: &Library| library.vectors.len() <= 8 + coefficients.len() / 2;
     while !open.is_empty() && enough(&library) {
         let before = open.len();
-        open.retain(|c| match c.found(&library) {
+        open.retain(|c| match c.found(&library, &mut partners) {
             Some(found) => {
-                terms.extend(found);
+                terms.extend(found.into_iter().flatten());
                 false
             }
             None => true,
         });
         if open.len() == before {
-            terms.extend(open.remove(0).new_terms(&mut library, &popularity));
+            terms.extend(open.remove(0).new_terms(&mut library, &popularity, &mut partners[0]).into_iter().flatten());
         }
     }
     if enough(&library) { grids(n, &library, &terms) } else { None }
@@ -123,16 +168,16 @@ impl<'a> Coefficient<'a> {
     fn new(unknown: usize, entries: &'a [(usize, usize, f64)]) -> Option<Self> {
         let &(row, column, _) = entries.first()?;
         let (mut stars, mut pairs) = (Vec::new(), Vec::new());
-        let ends = if row == column { vec![row] } else { vec![row, column] };
-        for &first in &ends {
-            let rest: Vec<_> = entries.iter().filter(|e| e.0 != first && e.1 != first).collect();
-            let Some(&&(row, column, _)) = rest.first() else {
+        let ends = [row, column];
+        for &first in if row == column { &ends[..1] } else { &ends } {
+            let mut rest = entries.iter().filter(|e| e.0 != first && e.1 != first);
+            let Some(&(row, column, _)) = rest.next() else {
                 stars.push(first);
                 continue;
             };
             for second in [row, column] {
                 let pair = [first.min(second), first.max(second)];
-                if rest.iter().all(|e| e.0 == second || e.1 == second) && !pairs.contains(&pair) {
+                if rest.clone().all(|e| e.0 == second || e.1 == second) && !pairs.contains(&pair) {
                     pairs.push(pair);
                 }
             }
@@ -143,16 +188,18 @@ impl<'a> Coefficient<'a> {
         (!stars.is_empty() || !pairs.is_empty()).then_some(Self { unknown, entries, stars, pairs })
     }
 
-    /// g of the centre, without its entry at `other`.
-    fn partner(&self, centre: usize, other: Option<usize>) -> Vector {
+    /// g of the centre, without its entry at `other`, in the memory given.
+    fn partner<'b>(&self, centre: usize, other: Option<usize>, vector: &'b mut Vector) -> &'b [(usize, f64)] {
         let meets = self.entries.iter().filter_map(|&(row, column, value)| match (row == centre, column == centre) {
             (true, true) => Some((row, 0.5 * value)),
             (true, false) => Some((column, value)),
             (false, true) => Some((row, value)),
             (false, false) => None,
         });
-        let mut vector: Vector = meets.filter(|(i, _)| Some(*i) != other).collect();
-        vector.sort_by_key(|(i, _)| *i);
+        vector.clear();
+        vector.extend(meets.filter(|(i, _)| Some(*i) != other));
+        // No two entries are at the same place.
+        vector.sort_unstable_by_key(|(i, _)| *i);
         vector
     }
 
@@ -162,46 +209,46 @@ impl<'a> Coefficient<'a> {
     }
 
     /// Terms whose vectors are all in the library.
-    fn found(&self, library: &Library) -> Option<Vec<Term>> {
+    fn found(&self, library: &Library, [low_memory, high_memory]: &mut [Vector; 2]) -> Option<[Option<Term>; 2]> {
         let Self { unknown, .. } = *self;
         for &[low, high] in &self.pairs {
             let sum = self.crossing([low, high]);
-            let of_high = library.completions(&self.partner(high, Some(low)), low);
-            if of_high.is_empty() {
+            let of_high = library.completions(self.partner(high, Some(low), high_memory), low);
+            if of_high.clone().next().is_none() {
                 continue;
             }
-            let of_low = library.completions(&self.partner(low, Some(high)), high);
-            for &(vector, a) in &of_low {
-                for &(other, b) in &of_high {
+            let of_low = library.completions(self.partner(low, Some(high), low_memory), high);
+            for (vector, a) in of_low {
+                for (other, b) in of_high.clone() {
                     if (sum - a - b).abs() <= ROUNDINGS * f64::EPSILON * (a.abs() + b.abs()) {
                         let first = Term { vector, centre: low, unknown };
-                        return Some(vec![first, Term { vector: other, centre: high, unknown }]);
+                        return Some([Some(first), Some(Term { vector: other, centre: high, unknown })]);
                     }
                 }
             }
         }
         let star = |&centre: &usize| {
-            let vector = library.find(&self.partner(centre, None))?;
-            Some(vec![Term { vector, centre, unknown }])
+            let vector = library.find(self.partner(centre, None, low_memory))?;
+            Some([Some(Term { vector, centre, unknown }), None])
         };
         self.stars.iter().find_map(star)
     }
 
     /// Terms with new vectors, around the centres that are met most.
-    fn new_terms(&self, library: &mut Library, popularity: &[usize]) -> Vec<Term> {
+    fn new_terms(&self, library: &mut Library, popularity: &[usize], memory: &mut Vector) -> [Option<Term>; 2] {
         let Self { unknown, .. } = *self;
         let most = self.stars.iter().copied().max_by_key(|&c| (popularity[c], std::cmp::Reverse(c)));
         if let Some(centre) = most {
-            let vector = library.insert(self.partner(centre, None));
-            return vec![Term { vector, centre, unknown }];
+            let vector = library.insert(self.partner(centre, None, memory));
+            return [Some(Term { vector, centre, unknown }), None];
         }
         let popular = |pair: &[usize; 2]| popularity[pair[0]] + popularity[pair[1]];
         let Some(&[low, high]) = self.pairs.iter().max_by_key(|pair| popular(pair)) else {
-            return Vec::new();
+            return [None, None];
         };
-        let first = library.insert(self.partner(low, None));
-        let second = library.insert(self.partner(high, Some(low)));
-        vec![Term { vector: first, centre: low, unknown }, Term { vector: second, centre: high, unknown }]
+        let first = library.insert(self.partner(low, None, memory));
+        let second = library.insert(self.partner(high, Some(low), memory));
+        [Some(Term { vector: first, centre: low, unknown }), Some(Term { vector: second, centre: high, unknown })]
     }
 }
 

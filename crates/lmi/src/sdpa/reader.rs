@@ -1,7 +1,6 @@
 //! Reading `.dat-s`, as a stream of numbers with line counts.
 
 use super::{BlockShape, Coefficient, Sdp};
-use std::collections::VecDeque;
 use std::io::BufRead;
 
 /// Why a `.dat-s` file cannot be read.
@@ -70,7 +69,7 @@ const MOST: i64 = 1_000_000;
 ///
 /// [`ReadError`] with the line where the file departs from the format.
 pub fn read(input: impl BufRead) -> Result<Sdp, ReadError> {
-    let mut numbers = Numbers { input, line: 0, tokens: VecDeque::new() };
+    let mut numbers = Numbers::of(input);
     let m = numbers.leading_count("the number of unknowns")?;
     let count = numbers.leading_count("the number of blocks")?;
     let mut blocks = Vec::new();
@@ -90,12 +89,12 @@ pub fn read(input: impl BufRead) -> Result<Sdp, ReadError> {
             Ok(n) => BlockShape::Symmetric(n),
         });
     }
-    numbers.tokens.clear();
+    numbers.skip_line();
     let mut objective = Vec::new();
     for _ in 0..m {
         objective.push(numbers.real("an entry of the objective")?);
     }
-    numbers.tokens.clear();
+    numbers.skip_line();
     let mut coefficients = Vec::new();
     while numbers.fill()? {
         let matrix = numbers.integer("the number of a coefficient matrix", 0, m as i64)? as usize;
@@ -124,74 +123,116 @@ pub fn read(input: impl BufRead) -> Result<Sdp, ReadError> {
 /// The numbers of a file, one line in memory at a time.
 struct Numbers<R> {
     input: R,
+    /// The number of the line.
     line: usize,
-    tokens: VecDeque<String>,
+    bytes: Vec<u8>,
+    text: String,
+    /// Where in the text the next token begins.
+    at: usize,
+}
+
+/// What stands between two separators.
+#[derive(Clone, Copy)]
+struct Token<'a> {
+    text: &'a str,
+    line: usize,
+    expected: &'static str,
+}
+
+fn separates(c: char) -> bool {
+    c.is_whitespace() || matches!(c, ',' | '(' | ')' | '{' | '}')
 }
 
 impl<R: BufRead> Numbers<R> {
+    fn of(input: R) -> Self {
+        Self { input, line: 0, bytes: Vec::new(), text: String::new(), at: 0 }
+    }
+
     /// Reads on until there is a token; false at the end of the file.
     fn fill(&mut self) -> Result<bool, ReadError> {
-        let mut bytes = Vec::new();
-        while self.tokens.is_empty() {
-            bytes.clear();
-            let read = self.input.read_until(b'\n', &mut bytes);
+        loop {
+            if let Some(gap) = self.text[self.at..].find(|c| !separates(c)) {
+                self.at += gap;
+                return Ok(true);
+            }
+            self.bytes.clear();
+            let read = self.input.read_until(b'\n', &mut self.bytes);
             let read = read.map_err(|source| ReadError::Io { line: self.line + 1, source })?;
+            self.skip_line();
             if read == 0 {
                 return Ok(false);
             }
             self.line += 1;
-            let text = String::from_utf8_lossy(&bytes);
-            let text = text.trim_start_matches('\u{feff}').trim();
-            if text.starts_with(['"', '*']) {
-                continue;
+            let text = String::from_utf8_lossy(&self.bytes);
+            let text = text.trim_start_matches('\u{feff}').trim_start();
+            if !text.starts_with(['"', '*']) {
+                self.text.push_str(text);
             }
-            let separators = |c: char| c.is_whitespace() || ",(){}".contains(c);
-            self.tokens.extend(text.split(separators).filter(|token| !token.is_empty()).map(str::to_owned));
         }
-        Ok(true)
     }
 
-    fn next(&mut self, expected: &'static str) -> Result<String, ReadError> {
-        self.fill()?;
-        self.tokens.pop_front().ok_or(ReadError::UnexpectedEnd { line: self.line, expected })
+    fn skip_line(&mut self) {
+        self.text.clear();
+        self.at = 0;
+    }
+
+    fn next(&mut self, expected: &'static str) -> Result<Token<'_>, ReadError> {
+        if !self.fill()? {
+            return Err(ReadError::UnexpectedEnd { line: self.line, expected });
+        }
+        let rest = &self.text[self.at..];
+        let text = &rest[..rest.find(separates).unwrap_or(rest.len())];
+        self.at += text.len();
+        Ok(Token { text, line: self.line, expected })
     }
 
     /// A count at the start of a line; what follows on the line is a remark.
     fn leading_count(&mut self, what: &'static str) -> Result<usize, ReadError> {
-        self.fill()?;
-        if let Some(first) = self.tokens.front_mut() {
-            // Some files glue the remark to the number, as in "13=mDIM".
-            let digits = first.find(|c: char| !(c.is_ascii_digit() || c == '+' || c == '-')).unwrap_or(first.len());
-            if digits > 0 {
-                first.truncate(digits);
-            }
-        }
-        let count = self.integer(what, 1, MOST)?;
-        self.tokens.clear();
+        let count = self.next(what)?.without_remark().integer(1, MOST)?;
+        self.skip_line();
         Ok(count as usize)
     }
 
     fn integer(&mut self, what: &'static str, least: i64, most: i64) -> Result<i64, ReadError> {
-        let token = self.next(what)?;
+        self.next(what)?.integer(least, most)
+    }
+
+    fn real(&mut self, what: &'static str) -> Result<f64, ReadError> {
+        self.next(what)?.real()
+    }
+}
+
+impl Token<'_> {
+    /// Some files glue the remark to the number, as in "13=mDIM".
+    fn without_remark(mut self) -> Self {
+        let digits = self.text.find(|c: char| !(c.is_ascii_digit() || c == '+' || c == '-'));
+        self.text = &self.text[..digits.filter(|digits| *digits > 0).unwrap_or(self.text.len())];
+        self
+    }
+
+    fn not_a_number(self) -> ReadError {
+        ReadError::NotANumber { line: self.line, found: self.text.to_owned(), expected: self.expected }
+    }
+
+    fn integer(self, least: i64, most: i64) -> Result<i64, ReadError> {
         // Some files write counts as reals, as in "3.0".
-        let parsed = token.parse::<i64>().ok().or_else(|| {
-            let value = token.parse::<f64>().ok()?;
+        let parsed = self.text.parse::<i64>().ok().or_else(|| {
+            let value = self.text.parse::<f64>().ok()?;
             (value.fract() == 0.0 && value.abs() < 1e15).then_some(value as i64)
         });
-        let found = parsed.ok_or(ReadError::NotANumber { line: self.line, found: token, expected: what })?;
+        let found = parsed.ok_or_else(|| self.not_a_number())?;
         if found < least || found > most {
-            return Err(ReadError::OutOfRange { line: self.line, what, found, least, most });
+            return Err(ReadError::OutOfRange { line: self.line, what: self.expected, found, least, most });
         }
         Ok(found)
     }
 
-    fn real(&mut self, what: &'static str) -> Result<f64, ReadError> {
-        let token = self.next(what)?;
+    fn real(self) -> Result<f64, ReadError> {
         // Fortran writes exponents with D.
-        let parsed = token.parse::<f64>().or_else(|_| token.replace(['D', 'd'], "e").parse::<f64>());
+        let parsed = self.text.parse::<f64>().or_else(|_| self.text.replace(['D', 'd'], "e").parse::<f64>());
         match parsed {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(ReadError::NotANumber { line: self.line, found: token, expected: what }),
+            _ => Err(self.not_a_number()),
         }
     }
 }
