@@ -26,6 +26,8 @@ const UNDERFLOW: f64 = 1e-290;
 const LEAST_PIVOT: f64 = 1e-60;
 /// Least amount by which a negative bound stays below the estimate.
 const LEAST_ROUNDING: f64 = 1e-280;
+/// Steps towards a closer estimate of a small eigenvalue.
+const INVERSE_ITERATIONS: usize = 6;
 /// Halvings of the first guess when a lower bound is looked for.
 const HALVINGS: i32 = 120;
 
@@ -169,10 +171,15 @@ impl Enclosure {
         if cautious > 0.5 * smallest && self.exceeds(cautious) {
             return cautious;
         }
-        // The estimate is lost in rounding errors: halve until the proof succeeds.
+        // The estimate is lost in rounding errors, but perhaps not to a factorisation: otherwise halve until the proof succeeds.
         let top = smallest.abs().max(rounding).max(f64::MIN_POSITIVE);
         let shift = |halvings: i32| top * 0.5_f64.powi(halvings);
-        if self.exceeds(shift(HALVINGS)) {
+        if let Some(factor) = self.factor(shift(HALVINGS)) {
+            let near = factor.smallest_eigenvalue();
+            let close = [0.95, 0.5].map(|share| share * near).into_iter();
+            if let Some(bound) = close.filter(|&bound| bound > shift(HALVINGS)).find(|&bound| self.exceeds(bound)) {
+                return bound;
+            }
             let (mut fails, mut holds) = (-1, HALVINGS);
             while holds - fails > 1 {
                 let middle = (holds + fails) / 2;
@@ -190,12 +197,17 @@ impl Enclosure {
 
     /// Whether the matrix minus `shift`·I is proved to be positive definite.
     pub fn exceeds(&self, shift: f64) -> bool {
+        self.factor(shift).is_some()
+    }
+
+    /// The factor that proves the matrix minus `shift`·I to be positive definite; `None` where it is not proved.
+    fn factor(&self, shift: f64) -> Option<Factor> {
         let n = self.n;
         let mut exponents = Vec::with_capacity(n);
         for i in 0..n {
             let entry = self.high[i + i * n] - shift.min(0.0);
             if !(entry > 0.0 && entry.is_finite() && shift.is_finite()) {
-                return false;
+                return None;
             }
             exponents.push((-0.5 * entry.log2()).round() as i32);
         }
@@ -234,11 +246,48 @@ impl Enclosure {
             let tau = 1.001 * (error + backward);
             let entry = dd::add(Double { h: high[at], l: low[at] }, Double { h: -tau, l: 0.0 });
             if !entry.h.is_finite() {
-                return false;
+                return None;
             }
             (high[at], low[at]) = (entry.h, entry.l);
         }
-        factorizes(n, &mut high, &mut low)
+        factorizes(n, &mut high, &mut low).then_some(Factor { n, exponents, lower: high })
+    }
+}
+
+/// Of `2^e F 2^e − …`, e diagonal: the Cholesky factor rounded to `f64`, but for its diagonal, which holds the pivots.
+struct Factor {
+    n: usize,
+    exponents: Vec<i32>,
+    lower: Vec<f64>,
+}
+
+impl Factor {
+    /// An estimate of the smallest eigenvalue of F by inverse iteration, mostly from above.
+    fn smallest_eigenvalue(&self) -> f64 {
+        let Self { n, exponents, lower } = self;
+        let n = *n;
+        let scale: Vec<f64> = exponents.iter().map(|&e| 2.0_f64.powi(e)).collect();
+        let column = |k: usize| &lower[k * n..(k + 1) * n];
+        let mut estimate = f64::INFINITY;
+        let mut x: Vec<f64> = (0..n).map(|i| 1.0 + 0.3 * ((7 * i + 3) % 11) as f64 / 11.0).collect();
+        for _ in 0..INVERSE_ITERATIONS {
+            let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s / length);
+            for k in 0..n {
+                let (pivot, rest) = (column(k)[k].sqrt(), &column(k)[k + 1..]);
+                x[k] /= pivot;
+                let solved = x[k];
+                x[k + 1..].iter_mut().zip(rest).for_each(|(x, l)| *x -= solved * l);
+            }
+            for k in (0..n).rev() {
+                let (pivot, rest) = (column(k)[k].sqrt(), &column(k)[k + 1..]);
+                let inner: f64 = x[k + 1..].iter().zip(rest).map(|(x, l)| x * l).sum();
+                x[k] = (x[k] - inner) / pivot;
+            }
+            x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
+            estimate = 1.0 / x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        }
+        estimate
     }
 }
 
