@@ -10,6 +10,7 @@
 //! Blocks that hold the same lines, such as the 2^m vertices of a saturated design, add to the same sum. When all have, the sum is
 //! spread over the unknowns, of which a symmetric one has two places.
 
+use crate::aligned::Aligned;
 use crate::block::Block;
 use crate::dense::axpy;
 use crate::factored::{Factored, Group, NO_UNKNOWN, PADDING};
@@ -42,8 +43,8 @@ struct Row {
 struct Part {
     /// Columns of W.
     w: usize,
-    wpw: Vec<f64>,
-    wzw: Vec<f64>,
+    wpw: Aligned,
+    wzw: Aligned,
 }
 
 /// A pair of rows of one block.
@@ -80,7 +81,7 @@ pub(crate) struct Assembly {
     firsts: Vec<First>,
     sums: Vec<Sum>,
     pairs: Vec<Pair>,
-    memory: Vec<f64>,
+    memory: Aligned,
     product: Vec<f64>,
 }
 
@@ -110,7 +111,7 @@ impl Assembly {
             let w = factored.columns();
             let longest = assembly.product.len().max(factored.size() * w);
             assembly.product.resize(longest, 0.0);
-            assembly.parts.push(Part { w, wpw: vec![0.0; w * w], wzw: vec![0.0; w * w] });
+            assembly.parts.push(Part { w, wpw: Aligned::zeros(w * w), wzw: Aligned::zeros(w * w) });
         }
         // Lines come in the order of their unknowns, so that most entries of a sum lie in the columns of the first line.
         let mut order: Vec<usize> = (0..assembly.lines.len()).collect();
@@ -125,7 +126,7 @@ impl Assembly {
             assembly.add_first(line, &holders[line], &rows, &rank);
         }
         let most = assembly.firsts.iter().map(|first| first.len).max().unwrap_or(0);
-        assembly.memory = vec![0.0; most];
+        assembly.memory = Aligned::zeros(most);
         assembly
     }
 

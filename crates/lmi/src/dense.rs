@@ -1,5 +1,7 @@
 //! Dense kernels on symmetric and triangular matrices, n × n, column by column in a slice.
 
+use crate::aligned::Aligned;
+use crate::cholesky as middling;
 use crate::small;
 use crate::vectorized::vectorized;
 use faer::dyn_stack::{MemBuffer, MemStack};
@@ -13,8 +15,8 @@ const SMALL: usize = small::MOST;
 /// Scratch memory for the factorisations.
 pub(crate) struct Scratch {
     buffer: MemBuffer,
-    /// Of matrices up to [`SMALL`] rows.
-    padded: Vec<f64>,
+    /// Of matrices up to [`SMALL`] rows, or of the factorisation of those up to [`middling::MOST`].
+    padded: Aligned,
 }
 
 impl Scratch {
@@ -22,7 +24,9 @@ impl Scratch {
     pub fn new(n: usize) -> Self {
         let factor = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
         let inverse = llt::inverse::inverse_scratch::<f64>(n, Par::Seq);
-        Self { buffer: MemBuffer::new(factor.or(inverse)), padded: small::scratch(n) }
+        let of_middling = if n > SMALL { middling::scratch(n) } else { 0 };
+        let padded = small::scratch(n).max(of_middling);
+        Self { buffer: MemBuffer::new(factor.or(inverse)), padded: Aligned::zeros(padded) }
     }
 }
 
@@ -56,6 +60,9 @@ pub(crate) fn multiply_transposed(k: usize, n: usize, a: &[f64], b: &[f64], c: &
 
 /// Replaces the lower triangle of `a` by its Cholesky factor. False when `a` is not positive definite (or not finite).
 pub(crate) fn cholesky(n: usize, a: &mut [f64], scratch: &mut Scratch) -> bool {
+    if n > SMALL && n <= middling::MOST {
+        return middling::cholesky(n, a, &mut scratch.padded);
+    }
     if n > SMALL {
         let stack = MemStack::new(&mut scratch.buffer);
         let matrix = MatMut::from_column_major_slice_mut(a, n, n);
@@ -219,7 +226,9 @@ mod tests {
     /// A = 2I + ones·onesᵀ/n, A⁻¹ = I/2 − ones·onesᵀ/(6n).
     #[test]
     fn factor_and_inverse_of_every_size() {
-        with_every_instruction_set(|| (1..=SMALL + 2).chain([70]).for_each(factor_and_inverse));
+        with_every_instruction_set(|| {
+            (1..=SMALL + 2).chain([70, 126, 127, middling::MOST + 1]).for_each(factor_and_inverse)
+        });
     }
 
     fn factor_and_inverse(n: usize) {

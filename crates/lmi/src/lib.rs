@@ -50,10 +50,12 @@
 //! Infeasible, unbounded and inaccurate are outcomes ([`Outcome`]), not errors: they carry a witness, a ray or the
 //! best point with its residuals. [`Error`] is for problems that have no meaning. The [`guide`] has a page on each.
 
+mod aligned;
 mod answer;
 mod assembly;
 mod balancing;
 mod block;
+mod cholesky;
 mod conditioning;
 mod dense;
 mod direction;

@@ -8,9 +8,9 @@ pub(crate) const MOST: usize = 40;
 /// Columns are padded to a multiple of this, at least the widest vector register.
 const PADDING: usize = 8;
 
-/// Scratch memory for matrices up to n rows: as many columns of at most [`MOST`] vectors of two, or fewer of longer ones.
-pub(crate) fn scratch(n: usize) -> Vec<f64> {
-    vec![0.0; n.min(MOST) * MOST * 2]
+/// Numbers of scratch memory for matrices up to n rows: as many columns of at most [`MOST`] vectors of two, or fewer of longer ones.
+pub(crate) fn scratch(n: usize) -> usize {
+    n.min(MOST) * MOST * 2
 }
 
 /// c = a · b.
