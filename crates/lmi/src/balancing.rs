@@ -216,8 +216,8 @@ fn factors(program: &Program, equations: &[Equation]) -> Factors {
         let factors = least_squares(program, &kept);
         let scaled = |e: &Equation| e.log + scaling_log(e, &factors);
         let mut logs: Vec<f64> = kept.iter().map(scaled).collect();
-        logs.sort_by(f64::total_cmp);
-        let median = logs.get(logs.len() / 2).copied().unwrap_or(0.0);
+        let middle = logs.len() / 2;
+        let median = if logs.is_empty() { 0.0 } else { *logs.select_nth_unstable_by(middle, f64::total_cmp).1 };
         let count = kept.len();
         kept.retain(|e| scaled(e) >= median - OUTLIER);
         if kept.len() == count {

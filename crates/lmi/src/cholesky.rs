@@ -1,7 +1,8 @@
 //! The Cholesky factorisation of matrices of middling size, too large for registers and too small for the packing that general products
 //! begin with: column by column from the left, four columns at a time.
 
-use crate::vectorized::arch;
+use crate::dense::dot;
+use crate::vectorized::{arch, vectorized};
 
 /// Most rows.
 pub(crate) const MOST: usize = 256;
@@ -10,27 +11,21 @@ const PADDING: usize = 8;
 /// Columns that are formed at once.
 const PANEL: usize = 4;
 
-/// Length of a padded column: an odd number of cache lines, so that a row is not all in the same few sets of the cache.
-fn stride(n: usize) -> usize {
+/// How far apart the padded columns begin: an odd number of cache lines, so that a row is not all in the same few sets of the cache.
+pub(crate) fn stride(n: usize) -> usize {
     let lines = n.div_ceil(PADDING);
     (lines + 1 - lines % 2) * PADDING
 }
 
-/// Numbers of scratch memory for matrices up to n rows.
-pub(crate) fn scratch(n: usize) -> usize {
-    n.min(MOST) * stride(n.min(MOST))
-}
-
-/// Replaces the lower triangle of `a`, n × n column by column, by its Cholesky factor. False when `a` is not positive definite (or not
-/// finite).
-pub(crate) fn cholesky(n: usize, a: &mut [f64], padded: &mut [f64]) -> bool {
-    arch().dispatch(Cholesky { n, a, padded })
+/// Replaces the lower triangle of `a`, columns a [`stride`] apart, by its Cholesky factor. False when `a` is not positive definite (or
+/// not finite).
+pub(crate) fn factorize(n: usize, a: &mut [f64]) -> bool {
+    arch().dispatch(Cholesky { n, a })
 }
 
 struct Cholesky<'a> {
     n: usize,
     a: &'a mut [f64],
-    padded: &'a mut [f64],
 }
 
 impl pulp::WithSimd for Cholesky<'_> {
@@ -38,18 +33,16 @@ impl pulp::WithSimd for Cholesky<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) -> bool {
-        let Self { n, a, padded } = self;
+        let Self { n, a } = self;
         let stride = stride(n);
-        for (j, (to, from)) in padded.chunks_exact_mut(stride).zip(a.chunks_exact(n)).enumerate() {
-            to[j - j % PADDING..j].fill(0.0);
-            to[j..n].copy_from_slice(&from[j..]);
-        }
+        // What is above the diagonal in its vector goes along with the rows below.
+        a.chunks_exact_mut(stride).enumerate().for_each(|(j, column)| column[j - j % PADDING..j].fill(0.0));
         let filled = n.div_ceil(S::F64_LANES);
         // As many accumulators as there are registers for.
         let most = if S::F64_LANES == 8 { 4 } else { 3 };
         for first in (0..n).step_by(PANEL) {
             let width = PANEL.min(n - first);
-            let (done, rest) = padded.split_at_mut(first * stride);
+            let (done, rest) = a.split_at_mut(first * stride);
             for start in (first / S::F64_LANES..filled).step_by(most) {
                 let rows = Rows { stride, first, start, done };
                 match (width, most.min(filled - start)) {
@@ -68,10 +61,6 @@ impl pulp::WithSimd for Cholesky<'_> {
             }
             if !factorize_panel(simd, rest, stride, first..first + width, filled) {
                 return false;
-            }
-            for (j, column) in rest.chunks_exact(stride).enumerate().take(width) {
-                let j = first + j;
-                a[j * n + j..(j + 1) * n].copy_from_slice(&column[j..n]);
             }
         }
         true
@@ -145,4 +134,38 @@ fn factorize_panel<S: pulp::Simd>(
         }
     }
     true
+}
+
+vectorized! {
+    /// x ← (L Lᵀ)⁻¹ x for the lower triangle L, columns `stride` apart.
+    pub(crate) fn solve_with_factor<'a>(n: usize, stride: usize, l: &'a [f64], x: &'a mut [f64]) {
+        for first in (0..n).step_by(PANEL) {
+            let end = (first + PANEL).min(n);
+            for j in first..end {
+                let known: f64 = (first..j).map(|k| l[j + k * stride] * x[k]).sum();
+                x[j] = (x[j] - known) / l[j + j * stride];
+            }
+            if end < n {
+                let (known, rest) = x.split_at_mut(end);
+                let columns: [&[f64]; PANEL] = std::array::from_fn(|k| &l[(first + k) * stride + end..(first + k) * stride + n]);
+                let factors: [f64; PANEL] = std::array::from_fn(|k| known[first + k]);
+                for (i, x) in rest.iter_mut().enumerate() {
+                    *x -= (0..PANEL).map(|k| factors[k] * columns[k][i]).sum::<f64>();
+                }
+            }
+        }
+        for first in (0..n).step_by(PANEL).rev() {
+            let end = (first + PANEL).min(n);
+            if end < n {
+                let (unknown, known) = x.split_at_mut(end);
+                for (k, x) in unknown[first..].iter_mut().enumerate() {
+                    *x -= dot(&l[(first + k) * stride + end..(first + k) * stride + n], known);
+                }
+            }
+            for j in (first..end).rev() {
+                let known: f64 = (j + 1..end).map(|k| l[k + j * stride] * x[k]).sum();
+                x[j] = (x[j] - known) / l[j + j * stride];
+            }
+        }
+    }
 }

@@ -3,7 +3,6 @@
 use crate::aligned::Aligned;
 use crate::cholesky as middling;
 use crate::small;
-use crate::vectorized::vectorized;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul as faer_matmul;
@@ -24,7 +23,7 @@ impl Scratch {
     pub fn new(n: usize) -> Self {
         let factor = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
         let inverse = llt::inverse::inverse_scratch::<f64>(n, Par::Seq);
-        let of_middling = if n > SMALL { middling::scratch(n) } else { 0 };
+        let of_middling = if n > SMALL { n.min(middling::MOST) * middling::stride(n.min(middling::MOST)) } else { 0 };
         let padded = small::scratch(n).max(of_middling);
         Self { buffer: MemBuffer::new(factor.or(inverse)), padded: Aligned::zeros(padded) }
     }
@@ -61,7 +60,13 @@ pub(crate) fn multiply_transposed(k: usize, n: usize, a: &[f64], b: &[f64], c: &
 /// Replaces the lower triangle of `a` by its Cholesky factor. False when `a` is not positive definite (or not finite).
 pub(crate) fn cholesky(n: usize, a: &mut [f64], scratch: &mut Scratch) -> bool {
     if n > SMALL && n <= middling::MOST {
-        return middling::cholesky(n, a, &mut scratch.padded);
+        let stride = middling::stride(n);
+        let padded = &mut scratch.padded[..n * stride];
+        let columns = |j: usize| (j * stride + j..j * stride + n, j * n + j..(j + 1) * n);
+        (0..n).map(columns).for_each(|(padded_column, column)| padded[padded_column].copy_from_slice(&a[column]));
+        let done = middling::factorize(n, padded);
+        (0..n).map(columns).for_each(|(padded_column, column)| a[column].copy_from_slice(&padded[padded_column]));
+        return done;
     }
     if n > SMALL {
         let stack = MemStack::new(&mut scratch.buffer);
@@ -92,43 +97,6 @@ pub(crate) fn inverse_from_factor(n: usize, l: &[f64], out: &mut [f64], scratch:
         return;
     }
     small::inverse_from_factor(n, l, out, &mut scratch.padded);
-}
-
-/// Columns that a triangular solve takes at once.
-const PANEL: usize = 4;
-
-vectorized! {
-    /// x ← (L Lᵀ)⁻¹ x for the lower triangle L.
-    pub(crate) fn solve_with_factor<'a>(n: usize, l: &'a [f64], x: &'a mut [f64]) {
-        for first in (0..n).step_by(PANEL) {
-            let end = (first + PANEL).min(n);
-            for j in first..end {
-                let known: f64 = (first..j).map(|k| l[j + k * n] * x[k]).sum();
-                x[j] = (x[j] - known) / l[j + j * n];
-            }
-            if end < n {
-                let (known, rest) = x.split_at_mut(end);
-                let columns: [&[f64]; PANEL] = std::array::from_fn(|k| &l[(first + k) * n + end..(first + k + 1) * n]);
-                let factors: [f64; PANEL] = std::array::from_fn(|k| known[first + k]);
-                for (i, x) in rest.iter_mut().enumerate() {
-                    *x -= (0..PANEL).map(|k| factors[k] * columns[k][i]).sum::<f64>();
-                }
-            }
-        }
-        for first in (0..n).step_by(PANEL).rev() {
-            let end = (first + PANEL).min(n);
-            if end < n {
-                let (unknown, known) = x.split_at_mut(end);
-                for (k, x) in unknown[first..].iter_mut().enumerate() {
-                    *x -= dot(&l[(first + k) * n + end..(first + k + 1) * n], known);
-                }
-            }
-            for j in (first..end).rev() {
-                let known: f64 = (j + 1..end).map(|k| l[k + j * n] * x[k]).sum();
-                x[j] = (x[j] - known) / l[j + j * n];
-            }
-        }
-    }
 }
 
 /// Copies the lower triangle to the upper one.
@@ -251,7 +219,7 @@ mod tests {
         assert!(norm(&product) < 1e-13, "{n}");
         let mut x: Vec<f64> = (0..n).map(|i| i as f64 - 3.0).collect();
         let right = x.clone();
-        solve_with_factor(n, &factor, &mut x);
+        crate::cholesky::solve_with_factor(n, n, &factor, &mut x);
         let mean = right.iter().sum::<f64>() / size;
         assert!(x.iter().zip(&right).all(|(x, r)| (x - 0.5 * r + mean / 6.0).abs() < 1e-13 * size), "{n}");
     }

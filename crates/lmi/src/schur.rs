@@ -1,7 +1,9 @@
 //! The Schur complement system `M dx = r`, `M_ij = Σ_b tr(F_{b,i} S_b⁻¹ F_{b,j} Z_b)`: symmetric, positive semidefinite,
 //! definite when the coefficient matrices are linearly independent.
 
-use crate::dense::{Scratch, axpy, cholesky, dot, norm, solve_with_factor};
+use crate::aligned::Aligned;
+use crate::cholesky::{self, solve_with_factor};
+use crate::dense::{self, Scratch, axpy, dot, norm};
 use crate::vectorized::vectorized;
 use faer::{Mat, Side};
 
@@ -15,7 +17,9 @@ pub(crate) struct Schur {
     n: usize,
     /// The lower triangle of M, column by column.
     pub matrix: Vec<f64>,
-    factor: Vec<f64>,
+    /// The lower triangle of the factor, columns `stride` apart.
+    factor: Aligned,
+    stride: usize,
     /// 1/√M_ii: the factorised matrix is scaled to a unit diagonal. Zero for unknowns that stay where they are.
     scale: Vec<f64>,
     scratch: Scratch,
@@ -27,12 +31,14 @@ pub(crate) struct Schur {
 
 impl Schur {
     pub fn new(n: usize) -> Self {
+        let (stride, packed) = if n <= cholesky::MOST { (cholesky::stride(n), 0) } else { (n, n) };
         Self {
             n,
             matrix: vec![0.0; n * n],
-            factor: vec![0.0; n * n],
+            factor: Aligned::zeros(n * stride),
+            stride,
             scale: vec![0.0; n],
-            scratch: Scratch::new(n),
+            scratch: Scratch::new(packed),
             residual: vec![0.0; n],
             correction: vec![0.0; n],
             regularization: 0.0,
@@ -70,8 +76,13 @@ impl Schur {
         }
         self.regularization = regularization;
         loop {
-            scaled(n, &self.matrix, &self.scale, 1.0 + self.regularization, &mut self.factor);
-            if cholesky(n, &mut self.factor, &mut self.scratch) {
+            scaled(n, self.stride, &self.matrix, &self.scale, 1.0 + self.regularization, &mut self.factor);
+            let done = if n <= cholesky::MOST {
+                cholesky::factorize(n, &mut self.factor)
+            } else {
+                dense::cholesky(n, &mut self.factor, &mut self.scratch)
+            };
+            if done {
                 return true;
             }
             self.regularization = if self.regularization == 0.0 { 1e-16 } else { self.regularization * 4.0 };
@@ -133,7 +144,7 @@ impl Schur {
     fn solve_factored(&mut self) {
         let n = self.n;
         self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
-        solve_with_factor(n, &self.factor, &mut self.correction);
+        solve_with_factor(n, self.stride, &self.factor, &mut self.correction);
         self.correction.iter_mut().zip(&self.scale).for_each(|(c, s)| *c *= s);
     }
 
@@ -145,9 +156,9 @@ impl Schur {
 }
 
 vectorized! {
-    /// out = diag(s) M diag(s) for the lower triangle of a symmetric M, with another diagonal.
-    fn scaled<'a>(n: usize, m: &'a [f64], s: &'a [f64], diagonal: f64, out: &'a mut [f64]) {
-        for (j, (out, column)) in out.chunks_exact_mut(n.max(1)).zip(m.chunks_exact(n.max(1))).enumerate() {
+    /// out = diag(s) M diag(s) for the lower triangle of a symmetric M, with another diagonal; columns of `out` are `stride` apart.
+    fn scaled<'a>(n: usize, stride: usize, m: &'a [f64], s: &'a [f64], diagonal: f64, out: &'a mut [f64]) {
+        for (j, (out, column)) in out.chunks_exact_mut(stride.max(1)).zip(m.chunks_exact(n.max(1))).enumerate() {
             for ((out, entry), other) in out[j..].iter_mut().zip(&column[j..]).zip(&s[j..]) {
                 *out = entry * s[j] * other;
             }
