@@ -18,6 +18,9 @@ use crate::vectorized::arch;
 use std::collections::HashMap;
 use std::ops::Range;
 
+/// Rows and columns that are folded at once: a cache line.
+const TILE: usize = 8;
+
 /// The scalar unknowns at the places of a row of a stack.
 #[derive(Debug)]
 struct Line {
@@ -162,7 +165,9 @@ impl Assembly {
         factored.project(z, &mut self.product, &mut part.wzw);
     }
 
-    /// Adds the sum over all blocks of tr(F_i P F_j Z) to M, lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`.
+    /// Adds the sum over all blocks of tr(F_i P F_j Z) to M, lower triangle: entry (i, j), j ≤ i, at `m[i + j·N]`. The upper triangle
+    /// is to be zero and is zero again afterwards: each entry first goes to the column of the unknown that it was formed for, where what
+    /// is near in memory was touched before.
     pub fn add(&mut self, m: &mut [f64], unknowns: usize) {
         arch().dispatch(Sums { assembly: self, m, unknowns });
     }
@@ -186,33 +191,42 @@ impl Line {
         self.positions.len().next_multiple_of(PADDING)
     }
 
-    /// Adds entries of one unknown with those of the line, which is another than that of the unknown.
+    /// Adds entries of one unknown with those of the line, which is another than that of the unknown, to its column of M.
     #[inline(always)]
-    fn spread(&self, unknown: usize, entries: &[f64], m: &mut [f64], n: usize) {
+    fn spread(&self, unknown: usize, entries: &[f64], column: &mut [f64]) {
         let (run, scattered) = entries.split_at(self.run);
         if self.run > 0 {
             let first = self.positions[0];
-            let before = unknown.saturating_sub(first).min(self.run);
-            for (s, value) in run[..before].iter().enumerate() {
-                m[(first + s) * n + unknown] += value;
-            }
-            let column = unknown * n + first;
-            axpy(1.0, &run[before..], &mut m[column + before..column + self.run]);
+            axpy(1.0, run, &mut column[first..first + self.run]);
             if (first..first + self.run).contains(&unknown) {
                 // As in `add_entry`.
-                m[unknown * n + unknown] += run[before];
+                column[unknown] += run[unknown - first];
             }
         }
-        for (&at, value) in self.positions[self.run..].iter().zip(scattered).filter(|(at, _)| **at != NO_UNKNOWN) {
-            add_entry(m, n, at, unknown, *value);
-        }
+        add_entries(column, unknown, &self.positions[self.run..], scattered);
     }
 }
 
 /// Adds what the places of two unknowns, not the same, have in common: twice where they belong to one unknown, as each is the first of a pair.
 #[inline(always)]
-fn add_entry(m: &mut [f64], n: usize, i: usize, j: usize, value: f64) {
-    m[i.min(j) * n + i.max(j)] += if i == j { 2.0 * value } else { value };
+fn add_entries(column: &mut [f64], unknown: usize, positions: &[usize], entries: &[f64]) {
+    for (&at, value) in positions.iter().zip(entries).filter(|(at, _)| **at != NO_UNKNOWN) {
+        column[at] += if at == unknown { 2.0 * value } else { *value };
+    }
+}
+
+/// Adds the upper triangle to the lower one and leaves it zero, tile by tile.
+#[inline(always)]
+fn fold(m: &mut [f64], n: usize) {
+    for left in (0..n).step_by(TILE) {
+        for top in (left..n).step_by(TILE) {
+            for j in left..(left + TILE).min(n) {
+                for i in top.max(j + 1)..(top + TILE).min(n) {
+                    m[i + j * n] += std::mem::take(&mut m[j + i * n]);
+                }
+            }
+        }
+    }
 }
 
 /// All sums, one first line after the other.
@@ -241,17 +255,19 @@ impl pulp::WithSimd for Sums<'_> {
                 let second = &lines[*line];
                 let rows = memory[*start..].chunks_exact(second.width()).zip(positions).enumerate();
                 for (q, (entries, &unknown)) in rows.filter(|(_, (_, unknown))| **unknown != NO_UNKNOWN) {
+                    let column = &mut m[unknown * n..(unknown + 1) * n];
                     if *line != first.line {
-                        second.spread(unknown, &entries[..second.positions.len()], m, n);
+                        second.spread(unknown, &entries[..second.positions.len()], column);
                         continue;
                     }
                     // The sum of a line with itself is symmetric: one half of it, and the diagonal once.
-                    m[unknown * n + unknown] += entries[q];
-                    for (&at, value) in positions[..q].iter().zip(entries).filter(|(at, _)| **at != NO_UNKNOWN) {
-                        add_entry(m, n, at, unknown, *value);
-                    }
+                    column[unknown] += entries[q];
+                    add_entries(column, unknown, &positions[..q], entries);
                 }
             }
+        }
+        if !firsts.is_empty() {
+            fold(m, n);
         }
     }
 }

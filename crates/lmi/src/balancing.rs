@@ -10,6 +10,7 @@ use crate::Options;
 use crate::answer::{Balancing, InaccurateReason, Residuals};
 use crate::block::Program;
 use crate::interior_point::{self, Ending, Solution};
+use std::borrow::Cow;
 
 /// Rounds of conjugate gradients for the logarithms of the factors, which need no more than one digit.
 const ROUNDS: usize = 40;
@@ -211,18 +212,18 @@ fn range_after(equations: &[Equation], factors: &Factors) -> (f64, f64) {
 /// Least squares without the entries that stay far below 1 however the others are scaled: sin π of a basis function is a
 /// zero that rounding left, and its logarithm would pull all factors its way.
 fn factors(program: &Program, equations: &[Equation]) -> Factors {
-    let mut kept = equations.to_vec();
+    let mut kept = Cow::Borrowed(equations);
     for _ in 0..OUTLIER_PASSES {
         let factors = least_squares(program, &kept);
         let scaled = |e: &Equation| e.log + scaling_log(e, &factors);
         let mut logs: Vec<f64> = kept.iter().map(scaled).collect();
         let middle = logs.len() / 2;
         let median = if logs.is_empty() { 0.0 } else { *logs.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        let count = kept.len();
-        kept.retain(|e| scaled(e) >= median - OUTLIER);
-        if kept.len() == count {
+        let outlying = |e: &Equation| scaled(e) < median - OUTLIER;
+        if !kept.iter().any(outlying) {
             return factors;
         }
+        kept.to_mut().retain(|e| !outlying(e));
     }
     least_squares(program, &kept)
 }

@@ -57,9 +57,7 @@ impl Schur {
         if s.iter().all(|s| *s == 1.0) {
             return;
         }
-        for j in 0..n {
-            self.matrix[j * n + j..(j + 1) * n].iter_mut().zip(&s[j..]).for_each(|(m, i)| *m *= i * s[j]);
-        }
+        scale_columns(n, s, &mut self.matrix);
     }
 
     /// Factorises M. Unknowns that appear nowhere stay where they are; linearly dependent coefficient matrices
@@ -152,6 +150,15 @@ impl Schur {
     fn update_residual(&mut self, r: &[f64], x: &[f64]) {
         subtract_product(self.n, &self.matrix, r, x, &mut self.residual);
         self.residual.iter_mut().zip(&self.scale).filter(|(_, s)| **s == 0.0).for_each(|(r, _)| *r = 0.0);
+    }
+}
+
+vectorized! {
+    /// M ← diag(s) M diag(s), lower triangle.
+    fn scale_columns<'a>(n: usize, s: &'a [f64], m: &'a mut [f64]) {
+        for (j, column) in m.chunks_exact_mut(n.max(1)).enumerate() {
+            column[j..].iter_mut().zip(&s[j..]).for_each(|(m, i)| *m *= i * s[j]);
+        }
     }
 }
 
