@@ -17,6 +17,11 @@ pub(crate) fn stride(n: usize) -> usize {
     (lines + 1 - lines % 2) * PADDING
 }
 
+/// Memory for the padded columns of matrices up to n rows.
+pub(crate) fn memory(n: usize) -> usize {
+    n.min(MOST) * stride(n.min(MOST))
+}
+
 /// Replaces the lower triangle of `a`, columns a [`stride`] apart, by its Cholesky factor. False when `a` is not positive definite (or
 /// not finite).
 pub(crate) fn factorize(n: usize, a: &mut [f64]) -> bool {

@@ -23,7 +23,7 @@ impl Scratch {
     pub fn new(n: usize) -> Self {
         let factor = llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Spec::default());
         let inverse = llt::inverse::inverse_scratch::<f64>(n, Par::Seq);
-        let of_middling = if n > SMALL { n.min(middling::MOST) * middling::stride(n.min(middling::MOST)) } else { 0 };
+        let of_middling = if n > SMALL { middling::memory(n) } else { 0 };
         let padded = small::scratch(n).max(of_middling);
         Self { buffer: MemBuffer::new(factor.or(inverse)), padded: Aligned::zeros(padded) }
     }
