@@ -139,8 +139,9 @@ struct Token<'a> {
     expected: &'static str,
 }
 
-fn separates(c: char) -> bool {
-    c.is_whitespace() || matches!(c, ',' | '(' | ')' | '{' | '}')
+/// Of a byte of a text whose white space is that of ASCII.
+fn separates(byte: &u8) -> bool {
+    matches!(byte, b' ' | b'\t'..=b'\r' | b',' | b'(' | b')' | b'{' | b'}')
 }
 
 impl<R: BufRead> Numbers<R> {
@@ -151,7 +152,7 @@ impl<R: BufRead> Numbers<R> {
     /// Reads on until there is a token; false at the end of the file.
     fn fill(&mut self) -> Result<bool, ReadError> {
         loop {
-            if let Some(gap) = self.text[self.at..].find(|c| !separates(c)) {
+            if let Some(gap) = self.text.as_bytes()[self.at..].iter().position(|byte| !separates(byte)) {
                 self.at += gap;
                 return Ok(true);
             }
@@ -165,8 +166,13 @@ impl<R: BufRead> Numbers<R> {
             self.line += 1;
             let text = String::from_utf8_lossy(&self.bytes);
             let text = text.trim_start_matches('\u{feff}').trim_start();
-            if !text.starts_with(['"', '*']) {
+            if text.starts_with(['"', '*']) {
+                continue;
+            }
+            if text.is_ascii() {
                 self.text.push_str(text);
+            } else {
+                self.text.extend(text.chars().map(|c| if c.is_whitespace() { ' ' } else { c }));
             }
         }
     }
@@ -181,7 +187,7 @@ impl<R: BufRead> Numbers<R> {
             return Err(ReadError::UnexpectedEnd { line: self.line, expected });
         }
         let rest = &self.text[self.at..];
-        let text = &rest[..rest.find(separates).unwrap_or(rest.len())];
+        let text = &rest[..rest.bytes().position(|byte| separates(&byte)).unwrap_or(rest.len())];
         self.at += text.len();
         Ok(Token { text, line: self.line, expected })
     }

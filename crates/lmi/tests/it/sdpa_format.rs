@@ -15,6 +15,10 @@ fn punctuation_comments_and_remarks_do_not_matter() {
     let odd = "\"a title\n* a remark\n 2 =mDIM\n2=nBLOCK\n {2,\n -3} = bLOCKsTRUCT\n{1.0D0, -25.0d-1}\r\n\n0 1 2 1 +1.5\n\
                {1, 2, 3, 3} 1\n2 1\n2 2 -.4\n";
     assert_eq!(read(odd.as_bytes()).unwrap(), plain);
+    // A byte order mark, white space of other scripts, a form feed.
+    let foreign = PLAIN.replace("1 2 3 3 1", "1\u{a0}2\u{2003}3\x0c3\t\u{3000}1");
+    assert_eq!(read(format!("\u{feff}{foreign}").as_bytes()).unwrap(), plain);
+    assert_ne!(foreign, PLAIN);
 }
 
 /// The error of a file, and the line it names.
