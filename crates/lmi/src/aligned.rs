@@ -2,8 +2,8 @@
 
 use std::ops::{Deref, DerefMut};
 
-/// Bytes of a cache line, and of the widest vector register.
-const LINE: usize = 64;
+/// Numbers in a cache line and in the widest vector register: rows and columns are padded to a multiple of this.
+pub(crate) const PADDING: usize = 8;
 
 /// A slice of numbers that begins with a cache line. (Where the allocator's address says nothing, anywhere: only speed depends on it.)
 #[derive(Debug, Default)]
@@ -16,9 +16,9 @@ pub(crate) struct Aligned {
 impl Aligned {
     /// So many zeros.
     pub fn zeros(len: usize) -> Self {
-        let spare = LINE / size_of::<f64>() - 1;
+        let spare = PADDING - 1;
         let all = vec![0.0; len + spare];
-        let first = all.as_ptr().align_offset(LINE).min(spare);
+        let first = all.as_ptr().align_offset(PADDING * size_of::<f64>()).min(spare);
         Self { all, first, len }
     }
 }

@@ -10,16 +10,16 @@
 //! Blocks that hold the same lines, such as the 2^m vertices of a saturated design, add to the same sum. When all have, the sum is
 //! spread over the unknowns, of which a symmetric one has two places.
 
-use crate::aligned::Aligned;
+use crate::aligned::{Aligned, PADDING};
 use crate::block::Block;
 use crate::dense::axpy;
-use crate::factored::{Factored, Group, NO_UNKNOWN, PADDING};
+use crate::factored::{Factored, Group, NO_UNKNOWN};
 use crate::vectorized::arch;
 use std::collections::HashMap;
 use std::ops::Range;
 
 /// Rows and columns that are folded at once: a cache line.
-const TILE: usize = 8;
+const TILE: usize = PADDING;
 
 /// The scalar unknowns at the places of a row of a stack.
 #[derive(Debug)]
@@ -116,7 +116,7 @@ impl Assembly {
             assembly.product.resize(longest, 0.0);
             assembly.parts.push(Part { w, wpw: Aligned::zeros(w * w), wzw: Aligned::zeros(w * w) });
         }
-        // Lines come in the order of their unknowns, so that most entries of a sum lie in the columns of the first line.
+        // Lines come in the order of their unknowns: one after the other, their sums go to neighbouring columns.
         let mut order: Vec<usize> = (0..assembly.lines.len()).collect();
         order.sort_by_key(|&line| assembly.lines[line].first());
         let mut rank = vec![0; order.len()];
@@ -199,7 +199,7 @@ impl Line {
             let first = self.positions[0];
             axpy(1.0, run, &mut column[first..first + self.run]);
             if (first..first + self.run).contains(&unknown) {
-                // As in `add_entry`.
+                // As in `add_entries`.
                 column[unknown] += run[unknown - first];
             }
         }

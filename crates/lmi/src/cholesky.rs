@@ -1,13 +1,12 @@
 //! The Cholesky factorisation of matrices of middling size, too large for registers and too small for the packing that general products
 //! begin with: column by column from the left, four columns at a time.
 
+use crate::aligned::PADDING;
 use crate::dense::dot;
 use crate::vectorized::{arch, vectorized};
 
 /// Most rows.
 pub(crate) const MOST: usize = 256;
-/// Columns are padded to a multiple of this, at least the widest vector register.
-const PADDING: usize = 8;
 /// Columns that are formed at once.
 const PANEL: usize = 4;
 

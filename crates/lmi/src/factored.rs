@@ -14,6 +14,7 @@
 //! (q, p) are one unknown, and so are (r, s) and (s, r). Summed over these four pairs the terms are the same, so that the third
 //! alone, `(v_pᵀPv_r)(v_qᵀZv_s)`, does for all.
 
+use crate::aligned::PADDING;
 use crate::dense::axpy;
 use crate::sparse::Entry;
 use crate::vectorized::vectorized;
@@ -144,9 +145,6 @@ pub(crate) struct Factored {
     w: Columns,
     groups: Vec<Group>,
 }
-
-/// Rows are padded to a multiple of this, at least the widest vector register.
-pub(crate) const PADDING: usize = 8;
 
 /// Scratch memory of one block's factored part, reused in every iteration.
 #[derive(Debug, Default)]

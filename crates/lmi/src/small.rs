@@ -1,12 +1,11 @@
 //! Kernels on matrices of up to [`MOST`] rows, whose columns fit a few vector registers. Column by column in slices; inner loops run
 //! over columns that are padded to whole vectors.
 
+use crate::aligned::PADDING;
 use crate::vectorized::arch;
 
 /// Most rows.
 pub(crate) const MOST: usize = 40;
-/// Columns are padded to a multiple of this, at least the widest vector register.
-const PADDING: usize = 8;
 
 /// Numbers of scratch memory for matrices up to n rows: as many columns of at most [`MOST`] vectors of two, or fewer of longer ones.
 pub(crate) fn scratch(n: usize) -> usize {
