@@ -4,9 +4,11 @@
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::engineers_words;
-use lpv::certificate::{Claim, PolytopicClaim, PolytopicLyapunov, prove_polytopic};
+use lpv::certificate::{Claim, Member, PolytopicClaim, PolytopicLyapunov, prove_polytopic};
 use lpv::math::Mat;
-use lpv::math::matrix::{from_rows, inverse_spd, is_finite, is_symmetric};
+use lpv::math::decimal::about;
+use lpv::math::definite::{Definiteness, asymmetry, definiteness, smallest_eigenvalue_about};
+use lpv::math::matrix::{from_rows, is_finite};
 use lpv::model::Polytope;
 use lpv::synthesis::CostWeights;
 use lpv::synthesis::polytopic::InputBounds;
@@ -15,7 +17,7 @@ use serde::Deserialize;
 type Rows = Vec<Vec<f64>>;
 /// Inputs of a high-gain design: there are 2^m mixtures.
 const MOST_HIGH_GAIN_INPUTS: usize = 10;
-/// Relative difference up to which a matrix is symmetric, and rates sum to zero.
+/// Relative size of what the sum of a rate vertex may be.
 const TOLERANCE: f64 = 1e-9;
 
 /// The keys that a certificate reads; others, of the answer of `lpv design`, are let be.
@@ -25,7 +27,8 @@ struct PolytopicFile {
     model: ModelTable,
     model_hash: Option<String>,
     weights: Option<WeightsTable>,
-    sigma: Option<Vec<f64>>,
+    /// Null where an input is not limited.
+    sigma: Option<Vec<Option<f64>>>,
     gamma: Option<f64>,
     rate_vertices: Option<Vec<Vec<f64>>>,
     #[serde(rename = "K")]
@@ -115,9 +118,9 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>
             ),
         }
     };
-    let symmetric = |key: &str, each: &[Mat<f64>]| match each.iter().position(|m| !is_symmetric(m, TOLERANCE)) {
-        None => Ok(()),
-        Some(at) => door.refuse(format!("{key}[{}]", at + 1), "has to be symmetric"),
+    let symmetric = |key: &str, each: &[Mat<f64>]| {
+        let numbered = |at: usize| if each.len() > 1 { format!("{key}[{}]", at + 1) } else { key.to_owned() };
+        each.iter().enumerate().try_for_each(|(at, matrix)| symmetric(door, &numbered(at), matrix))
     };
     let needed = |key: &str, given: Option<Vec<Mat<f64>>>| {
         given.map_or_else(|| door.refuse(key, "is missing: without it there is nothing to certify"), Ok)
@@ -170,9 +173,7 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>
                 let lyapunov = PolytopicLyapunov::Common { p: p[i].clone(), gain: vec![gain[i].clone()] };
                 let claims =
                     prove_polytopic(&claim(model, lyapunov, auxiliary_gain.as_ref().map(|f| vec![f[i].clone()])));
-                let place =
-                    if count > 1 { format!(", at point {} with the parameter at rest", i + 1) } else { String::new() };
-                claims.into_iter().map(move |claim| Claim { claim: format!("{}{place}", claim.claim), ..claim })
+                claims.into_iter().map(move |claim| if count > 1 { claim.of_member(Member::Point(i)) } else { claim })
             };
             Ok((0..count).flat_map(at).collect())
         }
@@ -203,17 +204,36 @@ fn matrix(door: &Door, key: &str, rows: &Rows) -> Result<Mat<f64>, Failure> {
     Ok(matrix)
 }
 
+/// A proof reads the numbers of the file: they have to be symmetric to the bit.
+fn symmetric(door: &Door, key: &str, matrix: &Mat<f64>) -> Result<(), Failure> {
+    let Some((i, j)) = asymmetry(matrix) else { return Ok(()) };
+    let [(a, b), (c, d)] = [(i + 1, j + 1), (j + 1, i + 1)];
+    let (one, other) = (matrix[(i, j)], matrix[(j, i)]);
+    door.refuse(
+        key,
+        format!("has {one} in row {a}, column {b}, and {other} in row {c}, column {d}: it has to be symmetric, the two the same number to the last digit"),
+    )
+}
+
 fn weights(door: &Door, table: &WeightsTable, n: usize, m: usize) -> Result<CostWeights, Failure> {
     let sized = |key: &str, rows: &Rows, size: usize| {
         let matrix = matrix(door, key, rows)?;
-        match (matrix.nrows(), matrix.ncols()) == (size, size) && is_symmetric(&matrix, TOLERANCE) {
-            true => Ok(matrix),
-            false => door.refuse(key, format!("has to be a symmetric {size} × {size} matrix")),
+        if (matrix.nrows(), matrix.ncols()) != (size, size) {
+            return door.refuse(key, format!("has to be a symmetric {size} × {size} matrix"));
         }
+        symmetric(door, key, &matrix)?;
+        Ok(matrix)
     };
     let (q, r) = (sized("weights.Q", &table.q, n)?, sized("weights.R", &table.r, m)?);
-    if inverse_spd(&r).is_none() {
-        return door.refuse("weights.R", "has to be positive definite");
+    let refuse = |key: &str, matrix: &Mat<f64>, needed: &str| {
+        let eigenvalue = about(smallest_eigenvalue_about(matrix));
+        door.refuse(key, format!("has to be {needed}: its smallest eigenvalue is about {eigenvalue}"))
+    };
+    if !matches!(definiteness(&q), Some(Definiteness::Positive | Definiteness::Semidefinite)) {
+        return refuse("weights.Q", &q, "positive semidefinite");
+    }
+    if definiteness(&r) != Some(Definiteness::Positive) {
+        return refuse("weights.R", &r, "positive definite");
     }
     Ok(CostWeights { q, r })
 }
@@ -235,8 +255,9 @@ fn saturation(
     if sigma.len() != m {
         return door.refuse("sigma", format!("has {} numbers: the model has {m} inputs", sigma.len()));
     }
-    sigma.iter().try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
-    Ok(Some(InputBounds { sigma: sigma.clone(), gamma }))
+    let sigma: Vec<f64> = sigma.iter().map(|bound| bound.unwrap_or(f64::INFINITY)).collect();
+    sigma.iter().filter(|bound| **bound != f64::INFINITY).try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
+    Ok(Some(InputBounds { sigma, gamma }))
 }
 
 fn rates(door: &Door, file: &PolytopicFile, count: usize) -> Result<Vec<Vec<f64>>, Failure> {

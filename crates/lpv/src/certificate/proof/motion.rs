@@ -18,7 +18,9 @@
 //! ```
 
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use super::{COST_INFLATION_RATE_BOUNDED, Claim, Verdict};
+use super::COST_INFLATION_RATE_BOUNDED;
+use crate::certificate::claim::{Claim, ClaimKind, Of, Verdict, Words};
+use crate::math::decimal::{at_least, at_most};
 use crate::controller::{Governor, Motion};
 use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
@@ -122,16 +124,15 @@ pub(in super::super) fn prove_motion(
         }),
         absorbed,
         claim: Claim {
-            claim: format!(
-                "the governed reference moves as the model does (moves of {} by up to {FARTHEST_MOVE}, of angles by half a turn)",
-                names.join(", ")
-            ),
-            verdict: Verdict::Undecided,
-            margin: f64::NAN,
-            detail: String::new(),
-            witness: None,
             cells: count,
-            seconds: 0.0,
+            ..Claim::new(
+                ClaimKind::GovernedMotion {
+                    states: names.iter().map(|name| (*name).to_owned()).collect(),
+                    farthest: FARTHEST_MOVE,
+                },
+                Of::Model,
+                &Words::default(),
+            )
         },
     };
     let scheduling = description.scheduling.as_ref().map(|scheduling| scheduling.state);
@@ -144,7 +145,7 @@ pub(in super::super) fn prove_motion(
     proof.claim.verdict = if disturbance < proof.absorbed { Verdict::Proved } else { Verdict::Undecided };
     proof.claim.margin = proof.absorbed - disturbance;
     proof.claim.detail =
-        format!("residual at most {disturbance:.1e}, the sets absorb {:.1e}; {count} cells", proof.absorbed);
+        format!("residual at most {}, the sets absorb {}; {count} cells", at_most(disturbance), at_least(proof.absorbed));
     let divided =
         |design: &Design| governor.authority_is_divided(&design.controller.limits, &design.controller.operating_input);
     if !members.iter().all(|(design, _)| divided(design)) {
