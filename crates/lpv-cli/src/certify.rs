@@ -82,7 +82,7 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     let (claims, verdict) = match prove_supervised(&design, &*plant, &options) {
         Ok(proofs) => {
             let claims = merged(checked, proofs.claims.clone());
-            // the rates found for a frozen design are a finding, not a claim that it makes
+            // what is looked for beyond the design's own claims counts only if it is decided
             let found: Vec<Claim> = proofs.claims.iter().filter(|claim| !proofs.members[0].is_counted(claim)).cloned().collect();
             let is_found = |claim: &&Claim| found.iter().any(|other| other.id == claim.id);
             let counted = claims.iter().filter(|claim| !is_found(claim));

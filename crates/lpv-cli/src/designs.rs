@@ -113,8 +113,7 @@ pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign]) -> Vec<Opti
         let proofs = prove(&checked.design, &*scenario.plant, &ProofOptions::default()).ok();
         bar.inc(1);
         let told = |proofs: &Proofs| {
-            let is_told = |claim: &&Claim| proofs.is_counted(claim) || claim.verdict == Verdict::Proved;
-            proofs.claims.iter().filter(is_told).cloned().collect::<Vec<Claim>>()
+            proofs.claims.iter().filter(|claim| proofs.is_counted(claim)).cloned().collect::<Vec<Claim>>()
         };
         if let Some(proofs) = &proofs {
             checked.claims = merged(std::mem::take(&mut checked.claims), told(proofs));

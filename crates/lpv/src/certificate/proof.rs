@@ -264,9 +264,11 @@ pub struct Proofs {
 }
 
 impl Proofs {
-    /// Whether the claim is one that the design, or the caller, makes: what is found beyond that is a finding.
+    /// Whether the claim counts in the verdict on the design: all that the design, or the caller, claims. What is looked for beyond that
+    /// is a finding, and counts if it is proved.
     pub fn is_counted(&self, claim: &Claim) -> bool {
-        self.asked || claim.verdict == Verdict::Refuted || matches!(claim.kind, ClaimKind::AsAsked { .. })
+        let is_decided = matches!(claim.verdict, Verdict::Proved | Verdict::Refuted);
+        self.asked || is_decided || matches!(claim.kind, ClaimKind::AsAsked { .. })
     }
 }
 
