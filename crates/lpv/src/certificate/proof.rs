@@ -286,7 +286,9 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
     let words = words(plant);
     let mut claims = vec![weights::claim(&design.weights, &words), definite(&closed_loop, &words)];
     let asked_level = options.level.or(design.method.gamma());
-    let level = unsaturated(&closed_loop, &words, asked_level, &mut claims);
+    // a frozen design claims its level at the grid points, and what is proved between them is a finding
+    let is_claimed = options.level.is_some() || design.rate_bounded.is_some() || !closed_loop.has_parameter;
+    let level = unsaturated(&closed_loop, &words, asked_level, is_claimed, &mut claims);
 
     let started = Instant::now();
     let mut cells = Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place| closed_loop.decrease(place));
@@ -423,6 +425,7 @@ fn unsaturated(
     closed_loop: &ClosedLoop,
     words: &Words,
     asked: Option<f64>,
+    is_claimed: bool,
     claims: &mut Vec<Claim>,
 ) -> Option<f64> {
     let rows = closed_loop.limited_rows();
@@ -456,7 +459,7 @@ fn unsaturated(
     let kind = ClaimKind::Unsaturated { level };
     let claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&["lyapunov-definite"]);
     claims.push(claim.refuted_by(witness));
-    if let Some(asked) = asked.filter(|asked| is_proved && *asked != level) {
+    if let Some(asked) = asked.filter(|asked| is_claimed && is_proved && *asked != level) {
         let kind = ClaimKind::AsAsked { what: "level", asked, proved: Some(level) };
         claims.push(Claim::new(kind, Of::Model, words));
     }

@@ -152,12 +152,7 @@ impl Design {
             (Schedule::Grid { parameters, period, gains }, Some(scheduling)) => {
                 same_grid("controller.schedule.parameters", parameters, Some(scheduling))?;
                 let expected = scheduling.periodic.then(|| scheduling.range[1] - scheduling.range[0]);
-                let same = |a: f64, b: f64| (a - b).abs() <= SAME * b.abs();
-                let is_same = match (*period, expected) {
-                    (Some(found), Some(expected)) => same(found, expected),
-                    (found, expected) => found == expected,
-                };
-                if !is_same || gains.len() != parameters.len() {
+                if *period != expected || gains.len() != parameters.len() {
                     return refuse(
                         "controller.schedule",
                         "does not fit the grid",
@@ -255,7 +250,12 @@ fn definite(key: &str, matrix: &Mat<f64>, size: usize, or_singular: bool) -> Res
 /// The grid has to be the plant's of as many points, which a design covers its whole range with.
 fn same_grid(key: &str, found: &[f64], scheduling: Option<&Scheduling>) -> Result<(), DesignError> {
     let expected = parameter_grid(scheduling, found.len());
-    let is_same = expected.len() == found.len()
-        && expected.iter().zip(found).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()));
-    if is_same { Ok(()) } else { refuse(key, "is not the plant's grid", "equidistant over the range of its parameter") }
+    match expected.iter().zip(found).position(|(a, b)| a != b) {
+        Some(at) => refuse(
+            key,
+            format!("is not the plant's grid: number {} is {}", at + 1, found[at]),
+            format!("equidistant over the range of its parameter, here {}", expected[at]),
+        ),
+        None => Ok(()),
+    }
 }
