@@ -138,7 +138,8 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>
     }
     let p = sized("P", &file.p, [n, n])?;
     let same = p.as_ref().is_some_and(|p| p.iter().all(|other| *other == p[0]));
-    let repeated = [("K", sized("K", &file.k, [m, n])?), ("L", sized("L", &file.l, [m, n])?), ("Y", sized("Y", &file.y, [n, n])?)];
+    let repeated =
+        [("K", sized("K", &file.k, [m, n])?), ("L", sized("L", &file.l, [m, n])?), ("Y", sized("Y", &file.y, [n, n])?)];
     let [k, l, y] = &repeated;
     agree(door, "L", &l.1, &[&k.1, &y.1])?;
     let identity = || vec![identity(n); count];
@@ -281,7 +282,10 @@ fn saturation(
         return door.refuse("sigma", format!("has {} numbers: the model has {m} inputs", sigma.len()));
     }
     let sigma: Vec<f64> = sigma.iter().map(|bound| bound.unwrap_or(f64::INFINITY)).collect();
-    sigma.iter().filter(|bound| **bound != f64::INFINITY).try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
+    sigma
+        .iter()
+        .filter(|bound| **bound != f64::INFINITY)
+        .try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
     Ok(Some(InputBounds { sigma, gamma }))
 }
 

@@ -159,8 +159,7 @@ fn the_printed_gain_of_the_thesis_is_refuted() {
     assert_eq!(stability["witness"]["parameter"], 0.0);
     for claim in claims {
         let keys: Vec<&String> = claim.as_object().unwrap().keys().collect();
-        let always =
-            ["at", "cells", "claim", "detail", "id", "kind", "margin", "of", "premises", "seconds", "verdict"];
+        let always = ["at", "cells", "claim", "detail", "id", "kind", "margin", "of", "premises", "seconds", "verdict"];
         assert!(always.iter().all(|key| keys.iter().any(|found| found == key)), "{keys:?}");
     }
     // at rest it is refuted by a proof with a witness

@@ -487,7 +487,9 @@ pub fn settle(claims: &mut [Claim]) {
                 None => (Verdict::Undecided, format!("it rests on {id}, of which nothing is known")),
                 Some(premise) => match premise.verdict {
                     Verdict::Proved => continue,
-                    Verdict::Numerical => (Verdict::Numerical, format!("it rests on a numerical check: {}", premise.claim)),
+                    Verdict::Numerical => {
+                        (Verdict::Numerical, format!("it rests on a numerical check: {}", premise.claim))
+                    }
                     word => (Verdict::Undecided, format!("it rests on what is {}: {}", word.word(), premise.claim)),
                 },
             };

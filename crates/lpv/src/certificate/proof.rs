@@ -436,7 +436,8 @@ fn unsaturated(
     let started = Instant::now();
     if let Some(&stuck) = rows.iter().find(|&&i| closed_loop.sigma[i] <= 0.0) {
         let kind = ClaimKind::Unsaturated { level: gamma };
-        let detail = format!("input {} has no room on one side of its operating value, and its gain is not zero", stuck + 1);
+        let detail =
+            format!("input {} has no room on one side of its operating value, and its gain is not zero", stuck + 1);
         let claim = Claim::new(kind, Of::Model, words).decided(Verdict::Undecided, f64::NAN, detail);
         claims.push(claim.resting_on(&["lyapunov-definite"]));
         return Some(gamma);

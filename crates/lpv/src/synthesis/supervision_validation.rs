@@ -160,7 +160,9 @@ impl Design {
 impl Design {
     /// The row that the governor takes for ρ̇ is the plant's.
     fn validate_flow(&self, motion: &Motion, plant: &dyn Plant) -> Result<(), DesignError> {
-        let (Some(flow), Some(state)) = (&motion.parameter_flow, self.controller.scheduling_state) else { return Ok(()) };
+        let (Some(flow), Some(state)) = (&motion.parameter_flow, self.controller.scheduling_state) else {
+            return Ok(());
+        };
         for point in GridModel::of_plant(plant, FLOW_POINTS).points {
             let n = point.a.ncols();
             let expected = Mat::from_fn(1, n, |_, j| point.a[(state, j)]);

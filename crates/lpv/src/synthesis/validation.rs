@@ -130,7 +130,11 @@ impl Design {
         let scheduling = plant.description().scheduling.as_ref();
         let operating = plant.trim(self.points[0].rho).input;
         if controller.operating_input != operating {
-            return refuse("controller.operating_input", "is not where the plant rests", format!("{operating:?}, to the last digit"));
+            return refuse(
+                "controller.operating_input",
+                "is not where the plant rests",
+                format!("{operating:?}, to the last digit"),
+            );
         }
         let state = scheduling.map(|scheduling| scheduling.state);
         if controller.scheduling_state != state {
@@ -228,7 +232,15 @@ pub(super) fn symmetric(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(),
     let Some((i, j)) = asymmetry(matrix) else { return Ok(()) };
     refuse(
         key,
-        format!("has {} in row {}, column {}, and {} in row {}, column {}", matrix[(i, j)], i + 1, j + 1, matrix[(j, i)], j + 1, i + 1),
+        format!(
+            "has {} in row {}, column {}, and {} in row {}, column {}",
+            matrix[(i, j)],
+            i + 1,
+            j + 1,
+            matrix[(j, i)],
+            j + 1,
+            i + 1
+        ),
         "symmetric, the two the same number to the last digit",
     )
 }
@@ -236,7 +248,9 @@ pub(super) fn symmetric(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(),
 /// Symmetric and ≻ 0, or ⪰ 0 where that is enough.
 fn definite(key: &str, matrix: &Mat<f64>, size: usize, or_singular: bool) -> Result<(), DesignError> {
     symmetric(key, matrix, size)?;
-    let found = |what: &str| format!("is {what}: its smallest eigenvalue is about {}", about(smallest_eigenvalue_about(matrix)));
+    let found = |what: &str| {
+        format!("is {what}: its smallest eigenvalue is about {}", about(smallest_eigenvalue_about(matrix)))
+    };
     match definiteness(matrix) {
         Some(Definiteness::Positive) => Ok(()),
         Some(Definiteness::Semidefinite) if or_singular => Ok(()),

@@ -18,12 +18,12 @@
 //! |w| < q y^{3/2} √γ / (2κ).
 //! ```
 
-use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use super::COST_INFLATION_RATE_BOUNDED;
+use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use crate::certificate::claim::{Claim, ClaimKind, Of, Verdict, Words};
-use crate::math::decimal::{at_least, at_most};
 use crate::controller::{Governor, Motion};
 use crate::math::Mat;
+use crate::math::decimal::{at_least, at_most};
 use crate::math::eigen::smallest_eigenvalue;
 use crate::math::interval::Interval;
 use crate::math::matrix::inverse_spd;
@@ -153,8 +153,11 @@ pub(in super::super) fn prove_motion(
     let disturbance = (0..names.len()).map(of_state).fold(0.0, f64::max);
     proof.claim.verdict = if disturbance < proof.absorbed { Verdict::Proved } else { Verdict::Undecided };
     proof.claim.margin = proof.absorbed - disturbance;
-    proof.claim.detail =
-        format!("residual at most {}, the sets absorb {}; {count} cells", at_most(disturbance), at_least(proof.absorbed));
+    proof.claim.detail = format!(
+        "residual at most {}, the sets absorb {}; {count} cells",
+        at_most(disturbance),
+        at_least(proof.absorbed)
+    );
     let divided =
         |design: &Design| governor.authority_is_divided(&design.controller.limits, &design.controller.operating_input);
     let rate = |design: &Design| design.rate_bounded.as_ref().map_or(0.0, |bounded| bounded.rate);

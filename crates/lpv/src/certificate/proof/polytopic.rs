@@ -85,9 +85,8 @@ pub fn prove_polytopic(claim: &PolytopicClaim) -> Vec<Claim> {
     };
     claims.push(sums.decrease(decrease, level, None));
     if let Some(weights) = &claim.weights {
-        let of_factor = |factor: f64| {
-            sums.decrease(ClaimKind::Cost { factor, level, motion }, level, Some((factor, weights)))
-        };
+        let of_factor =
+            |factor: f64| sums.decrease(ClaimKind::Cost { factor, level, motion }, level, Some((factor, weights)));
         let attempts: Vec<Claim> = COST_FACTORS.into_iter().map(of_factor).collect();
         let proved = attempts.iter().position(|claim| claim.verdict == Verdict::Proved).unwrap_or(0);
         claims.extend(attempts.into_iter().nth(proved));
