@@ -8,7 +8,9 @@ use crate::output::print;
 use crate::scenario::door::Door;
 use crate::scenario::read_text;
 use clap::Args;
-use lpv::certificate::{Claim, ClaimKind, Member, Of, ProofOptions, Verdict, Words, check, merged, prove_supervised, worst};
+use lpv::certificate::{
+    Claim, ClaimKind, Member, Of, ProofOptions, Verdict, Words, check, merged, prove_supervised, worst,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -82,8 +84,9 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     let (claims, verdict) = match prove_supervised(&design, &*plant, &options) {
         Ok(proofs) => {
             let claims = merged(checked, proofs.claims.clone());
-            // the rates found for a frozen design are a finding, not a claim that it makes
-            let found: Vec<Claim> = proofs.claims.iter().filter(|claim| !proofs.members[0].is_counted(claim)).cloned().collect();
+            // what is looked for beyond the design's own claims counts only if it is decided
+            let found: Vec<Claim> =
+                proofs.claims.iter().filter(|claim| !proofs.members[0].is_counted(claim)).cloned().collect();
             let is_found = |claim: &&Claim| found.iter().any(|other| other.id == claim.id);
             let counted = claims.iter().filter(|claim| !is_found(claim));
             let verdict = counted.map(|claim| claim.verdict).min().unwrap_or(Verdict::Undecided);

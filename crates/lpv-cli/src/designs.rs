@@ -18,7 +18,7 @@ pub struct CheckedDesign {
     pub design: Design,
     /// Claims about it that need no flight.
     pub claims: Vec<Claim>,
-    /// What is proved of a supervised design; `None` of others, which `lpv certify` proves.
+    /// What is proved of a design that is supervised or required to be proved; `None` of others, which `lpv certify` proves.
     pub proofs: Option<SupervisedProofs>,
     /// Seconds that synthesis took; zero where a design was shared.
     pub design_seconds: f64,
@@ -72,7 +72,8 @@ pub struct DesignSummary<'a> {
 pub fn text(label: &str, verdict: Verdict, claims: &[Claim]) -> String {
     let mut text = format!("{label}: {}\n", verdict.word());
     for claim in claims {
-        text.push_str(&format!("  {}: {} ({})\n", claim.verdict.word(), claim.claim, claim.detail));
+        let detail = if claim.detail.is_empty() { String::new() } else { format!(" ({})", claim.detail) };
+        text.push_str(&format!("  {}: {}{detail}\n", claim.verdict.word(), claim.claim));
     }
     text
 }
@@ -113,8 +114,7 @@ pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign]) -> Vec<Opti
         let proofs = prove(&checked.design, &*scenario.plant, &ProofOptions::default()).ok();
         bar.inc(1);
         let told = |proofs: &Proofs| {
-            let is_told = |claim: &&Claim| proofs.is_counted(claim) || claim.verdict == Verdict::Proved;
-            proofs.claims.iter().filter(is_told).cloned().collect::<Vec<Claim>>()
+            proofs.claims.iter().filter(|claim| proofs.is_counted(claim)).cloned().collect::<Vec<Claim>>()
         };
         if let Some(proofs) = &proofs {
             checked.claims = merged(std::mem::take(&mut checked.claims), told(proofs));
@@ -126,12 +126,14 @@ pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign]) -> Vec<Opti
     proofs
 }
 
-fn same_but_name(a: &ControllerPlan, b: &ControllerPlan) -> bool {
-    let (supervisions, a, b) = (a.supervision == b.supervision, &a.request, &b.request);
+fn same_but_name(a_plan: &ControllerPlan, b_plan: &ControllerPlan) -> bool {
+    let supervisions = a_plan.supervision == b_plan.supervision;
+    let (a, b) = (&a_plan.request, &b_plan.request);
     // all requests of a scenario share plant, weights, grid and sample time
     let requests =
         a.method == b.method && a.schedule == b.schedule && a.limits == b.limits && a.rate_bounded == b.rate_bounded;
-    requests && supervisions
+    // one that is to be proved is proved once, too
+    requests && supervisions && a_plan.require == b_plan.require
 }
 
 fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesign, SynthesisError> {
@@ -150,7 +152,7 @@ fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesig
         claims.extend(of_inner);
     }
     let mut proofs = None;
-    if design.controller.supervisor.is_some() {
+    if design.controller.supervisor.is_some() || plan.require == Some(Verdict::Proved) {
         bar.set_message(format!("prove {}", request.name));
         match prove_supervised(&design, &*scenario.plant, &ProofOptions::default()) {
             Ok(found) => {

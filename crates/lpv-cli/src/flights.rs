@@ -3,8 +3,8 @@
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::{StepStay, step_stays};
 use lpv::certificate::{
-    Claim, ClaimKind, Excursion, Of, Proofs, StepBound, StepConditions, SupervisedProofs, UnmetCondition, Verdict, Words, excursion,
-    lyapunov_value, step_bound,
+    Claim, ClaimKind, Excursion, Of, Proofs, StepBound, StepConditions, SupervisedProofs, UnmetCondition, Verdict,
+    Words, excursion, lyapunov_value, step_bound,
 };
 use lpv::model::linearize;
 use lpv::sim::{Flight, Performance, Simulation, StepResponse, Trajectory, performance};

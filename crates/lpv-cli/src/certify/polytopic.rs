@@ -8,7 +8,7 @@ use lpv::certificate::{Claim, Member, PolytopicClaim, PolytopicLyapunov, prove_p
 use lpv::math::Mat;
 use lpv::math::decimal::about;
 use lpv::math::definite::{Definiteness, asymmetry, definiteness, smallest_eigenvalue_about};
-use lpv::math::matrix::{from_rows, is_finite};
+use lpv::math::matrix::{from_rows, identity, is_finite};
 use lpv::model::Polytope;
 use lpv::synthesis::CostWeights;
 use lpv::synthesis::polytopic::InputBounds;
@@ -17,6 +17,8 @@ use serde::Deserialize;
 type Rows = Vec<Vec<f64>>;
 /// Inputs of a high-gain design: there are 2^m mixtures.
 const MOST_HIGH_GAIN_INPUTS: usize = 10;
+/// Relative difference of what a file says twice: inverses are no better.
+const REPEATED: f64 = 1e-6;
 /// Relative size of what the sum of a rate vertex may be.
 const TOLERANCE: f64 = 1e-9;
 
@@ -136,6 +138,12 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>
     }
     let p = sized("P", &file.p, [n, n])?;
     let same = p.as_ref().is_some_and(|p| p.iter().all(|other| *other == p[0]));
+    let repeated =
+        [("K", sized("K", &file.k, [m, n])?), ("L", sized("L", &file.l, [m, n])?), ("Y", sized("Y", &file.y, [n, n])?)];
+    let [k, l, y] = &repeated;
+    agree(door, "L", &l.1, &[&k.1, &y.1])?;
+    let identity = || vec![identity(n); count];
+    agree(door, "Y", &y.1.as_ref().and(p.as_ref()).map(|_| identity()), &[&p, &y.1])?;
     let kind = match (file.lyapunov, &file.rate_vertices) {
         (Some(kind), _) => kind,
         (None, Some(_)) => Kind::ParameterDependent,
@@ -204,6 +212,24 @@ fn matrix(door: &Door, key: &str, rows: &Rows) -> Result<Mat<f64>, Failure> {
     Ok(matrix)
 }
 
+/// What a file says twice is the same: `product` is that of `factors` at every vertex, as far as printed digits go.
+fn agree(
+    door: &Door,
+    key: &str,
+    product: &Option<Vec<Mat<f64>>>,
+    factors: &[&Option<Vec<Mat<f64>>>; 2],
+) -> Result<(), Failure> {
+    let (Some(product), [Some(left), Some(right)]) = (product, factors) else { return Ok(()) };
+    for (at, ((product, left), right)) in product.iter().zip(left).zip(right).enumerate() {
+        let size = product.norm_max().max(left.norm_max() * right.norm_max());
+        if (left * right - product).norm_max() > REPEATED * size {
+            let message = "does not agree with the file's other matrices: L = KY and YP = I at every vertex";
+            return door.refuse(format!("{key}[{}]", at + 1), message);
+        }
+    }
+    Ok(())
+}
+
 /// A proof reads the numbers of the file: they have to be symmetric to the bit.
 fn symmetric(door: &Door, key: &str, matrix: &Mat<f64>) -> Result<(), Failure> {
     let Some((i, j)) = asymmetry(matrix) else { return Ok(()) };
@@ -256,7 +282,10 @@ fn saturation(
         return door.refuse("sigma", format!("has {} numbers: the model has {m} inputs", sigma.len()));
     }
     let sigma: Vec<f64> = sigma.iter().map(|bound| bound.unwrap_or(f64::INFINITY)).collect();
-    sigma.iter().filter(|bound| **bound != f64::INFINITY).try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
+    sigma
+        .iter()
+        .filter(|bound| **bound != f64::INFINITY)
+        .try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
     Ok(Some(InputBounds { sigma, gamma }))
 }
 

@@ -405,7 +405,8 @@ impl Claim {
     pub fn refuted_by(mut self, witness: Option<Witness>) -> Self {
         if let Some(witness) = witness {
             self.verdict = Verdict::Refuted;
-            self.margin = witness.value;
+            // a margin that is known says more
+            self.margin = if self.margin.is_finite() { self.margin } else { witness.value };
             self.detail = format!("false{}: {}", at_witness(&witness), witness_words(&self.kind));
             self.witness = Some(witness);
         }
@@ -486,7 +487,9 @@ pub fn settle(claims: &mut [Claim]) {
                 None => (Verdict::Undecided, format!("it rests on {id}, of which nothing is known")),
                 Some(premise) => match premise.verdict {
                     Verdict::Proved => continue,
-                    Verdict::Numerical => (Verdict::Numerical, format!("it rests on a numerical check: {}", premise.claim)),
+                    Verdict::Numerical => {
+                        (Verdict::Numerical, format!("it rests on a numerical check: {}", premise.claim))
+                    }
                     word => (Verdict::Undecided, format!("it rests on what is {}: {}", word.word(), premise.claim)),
                 },
             };

@@ -66,10 +66,10 @@ fn point_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> 
                 _ => all,
             };
             margins.extend(vertices.into_iter().map(|vertex| {
-                let is_low = |i: usize| limited.iter().position(|&l| l == i).is_some_and(|bit| vertex >> bit.min(63) & 1 == 0);
-                let mixture = Mat::from_fn(inputs, gain.ncols(), |i, j| {
-                    if is_low(i) { auxiliary[(i, j)] } else { gain[(i, j)] }
-                });
+                let is_low =
+                    |i: usize| limited.iter().position(|&l| l == i).is_some_and(|bit| vertex >> bit.min(63) & 1 == 0);
+                let mixture =
+                    Mat::from_fn(inputs, gain.ncols(), |i, j| if is_low(i) { auxiliary[(i, j)] } else { gain[(i, j)] });
                 let rows: String = (0..inputs).rev().map(|i| if is_low(i) { '0' } else { '1' }).collect();
                 block(format!("performance of mixture {rows}"), performance(&mixture))
             }));

@@ -23,7 +23,7 @@ pub use region::{
 pub use stability::{StabilityMargin, frozen_stability};
 pub use supervised::{SupervisedProofs, prove_supervised};
 
-use crate::math::decimal::about;
+use crate::math::decimal::{Rounding, about, decimal};
 use crate::plant::Plant;
 use crate::synthesis::Design;
 use proof::unstable_at;
@@ -63,7 +63,11 @@ pub fn check(design: &Design, plant: &dyn Plant) -> Vec<Claim> {
     let sampled = checked(
         ClaimKind::SampledStability { sample_time_s: design.sample_time_s },
         1.0 - stability.radius,
-        format!("max |λ| = {:.6} {}, {count} parameter values", stability.radius, at(stability.radius_at)),
+        format!(
+            "max |λ| = {} {}, {count} parameter values",
+            decimal(stability.radius, 9, Rounding::Nearest),
+            at(stability.radius_at)
+        ),
     );
     vec![inequalities_claim(design, plant, &words), frozen, sampled]
 }
@@ -79,7 +83,9 @@ pub fn merged(checked: Vec<Claim>, proved: Vec<Claim>) -> Vec<Claim> {
     let is_implied = |claim: &Claim| match claim.kind {
         ClaimKind::FrozenStability => known(claim, &["decrease", "invariance"]),
         ClaimKind::GridInequalities => {
-            known(claim, &["cost"]) && known(claim, &["decrease", "invariance"]) && !has_open(&proved, claim, "unsaturated")
+            known(claim, &["cost"])
+                && known(claim, &["decrease", "invariance"])
+                && !has_open(&proved, claim, "unsaturated")
         }
         _ => proved.iter().any(|other| other.id == claim.id),
     };

@@ -264,9 +264,11 @@ pub struct Proofs {
 }
 
 impl Proofs {
-    /// Whether the claim is one that the design, or the caller, makes: what is found beyond that is a finding.
+    /// Whether the claim counts in the verdict on the design: all that the design, or the caller, claims. What is looked for beyond that
+    /// is a finding, and counts if it is proved.
     pub fn is_counted(&self, claim: &Claim) -> bool {
-        self.asked || claim.verdict == Verdict::Refuted || matches!(claim.kind, ClaimKind::AsAsked { .. })
+        let is_decided = matches!(claim.verdict, Verdict::Proved | Verdict::Refuted);
+        self.asked || is_decided || matches!(claim.kind, ClaimKind::AsAsked { .. })
     }
 }
 
@@ -284,7 +286,9 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
     let words = words(plant);
     let mut claims = vec![weights::claim(&design.weights, &words), definite(&closed_loop, &words)];
     let asked_level = options.level.or(design.method.gamma());
-    let level = unsaturated(&closed_loop, &words, asked_level, &mut claims);
+    // a frozen design claims its level at the grid points, and what is proved between them is a finding
+    let is_claimed = options.level.is_some() || design.rate_bounded.is_some() || !closed_loop.has_parameter;
+    let level = unsaturated(&closed_loop, &words, asked_level, is_claimed, &mut claims);
 
     let started = Instant::now();
     let mut cells = Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place| closed_loop.decrease(place));
@@ -421,6 +425,7 @@ fn unsaturated(
     closed_loop: &ClosedLoop,
     words: &Words,
     asked: Option<f64>,
+    is_claimed: bool,
     claims: &mut Vec<Claim>,
 ) -> Option<f64> {
     let rows = closed_loop.limited_rows();
@@ -431,7 +436,8 @@ fn unsaturated(
     let started = Instant::now();
     if let Some(&stuck) = rows.iter().find(|&&i| closed_loop.sigma[i] <= 0.0) {
         let kind = ClaimKind::Unsaturated { level: gamma };
-        let detail = format!("input {} has no room on one side of its operating value, and its gain is not zero", stuck + 1);
+        let detail =
+            format!("input {} has no room on one side of its operating value, and its gain is not zero", stuck + 1);
         let claim = Claim::new(kind, Of::Model, words).decided(Verdict::Undecided, f64::NAN, detail);
         claims.push(claim.resting_on(&["lyapunov-definite"]));
         return Some(gamma);
@@ -454,7 +460,7 @@ fn unsaturated(
     let kind = ClaimKind::Unsaturated { level };
     let claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&["lyapunov-definite"]);
     claims.push(claim.refuted_by(witness));
-    if let Some(asked) = asked.filter(|asked| is_proved && *asked != level) {
+    if let Some(asked) = asked.filter(|asked| is_claimed && is_proved && *asked != level) {
         let kind = ClaimKind::AsAsked { what: "level", asked, proved: Some(level) };
         claims.push(Claim::new(kind, Of::Model, words));
     }

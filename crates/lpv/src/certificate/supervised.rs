@@ -56,10 +56,11 @@ pub fn prove_supervised(
         let member = if k == 0 { Member::Outer } else { Member::Inner(k - 1) };
         ClaimId { name: "cost", subject: Subject { member, ..Subject::default() } }
     };
-    claims.extend(motion.iter().map(|motion| Claim {
-        premises: (0..members.len()).map(absorbing).collect(),
-        ..motion.claim.clone()
-    }));
+    claims.extend(
+        motion
+            .iter()
+            .map(|motion| Claim { premises: (0..members.len()).map(absorbing).collect(), ..motion.claim.clone() }),
+    );
     settle(&mut claims);
     let has_parameter = plant.description().scheduling.is_some();
     let rate = members.iter().try_fold(f64::INFINITY, |least, proofs| {

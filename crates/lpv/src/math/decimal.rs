@@ -109,6 +109,13 @@ pub fn about(value: f64) -> String {
     decimal(value, DIGITS, Rounding::Nearest)
 }
 
+/// `value` with so many decimals, for columns of numbers; in the exponent form where it would read as zero and is not.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let reads_as_zero = text.bytes().all(|byte| !byte.is_ascii_digit() || byte == b'0');
+    if value != 0.0 && value.is_finite() && reads_as_zero { format!("{value:.2e}") } else { text }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -138,6 +145,15 @@ mod tests {
         assert_eq!((at_least(0.1_f64.next_down()), at_most(0.1_f64.next_up())), ("0.099999".into(), "0.10001".into()));
         assert_eq!(at_least(f64::MAX), "1.7976e308");
         assert_ne!(at_least(f64::from_bits(1)), "0");
+    }
+
+    #[test]
+    fn columns_show_what_is_not_zero() {
+        assert_eq!((fixed(1.25, 6), fixed(0.0, 2), fixed(-0.0, 1)), ("1.250000".into(), "0.00".into(), "-0.0".into()));
+        assert_eq!(
+            (fixed(1e-9, 6), fixed(-4e-5, 2), fixed(0.004, 1)),
+            ("1.00e-9".into(), "-4.00e-5".into(), "4.00e-3".into())
+        );
     }
 
     proptest! {

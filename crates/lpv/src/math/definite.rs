@@ -145,7 +145,9 @@ mod tests {
         assert_eq!(of(&[&[1.0, 0.5], &[0.5_f64.next_up(), 1.0]]), None, "asymmetric by one unit in the last place");
         assert_eq!(of(&[&[0.0, 1.0], &[1.0, 5.0]]), Some(Indefinite));
         assert_eq!(definiteness(&diagonal(&[1e300, 1e-300, 5e-324])), Some(Positive));
-        assert_eq!(of(&[&[1e300, 1.0], &[1.0, 1e-300]]), Some(if 1e300 * 1e-300 > 1.0 { Positive } else { Indefinite }));
+        let (large, small) = (2.0_f64.powi(900), 2.0_f64.powi(-900));
+        assert_eq!(of(&[&[large, 1.0], &[1.0, small]]), Some(Semidefinite));
+        assert_eq!(of(&[&[large, 1.0], &[1.0, small.next_up()]]), Some(Positive));
         assert_eq!(of(&[&[1.0, 0.0], &[0.0, -20.0]]), Some(Indefinite));
         assert_eq!(definiteness(&identity(64)), Some(Positive));
     }

@@ -130,7 +130,11 @@ impl Design {
         let scheduling = plant.description().scheduling.as_ref();
         let operating = plant.trim(self.points[0].rho).input;
         if controller.operating_input != operating {
-            return refuse("controller.operating_input", "is not where the plant rests", format!("{operating:?}, to the last digit"));
+            return refuse(
+                "controller.operating_input",
+                "is not where the plant rests",
+                format!("{operating:?}, to the last digit"),
+            );
         }
         let state = scheduling.map(|scheduling| scheduling.state);
         if controller.scheduling_state != state {
@@ -152,12 +156,7 @@ impl Design {
             (Schedule::Grid { parameters, period, gains }, Some(scheduling)) => {
                 same_grid("controller.schedule.parameters", parameters, Some(scheduling))?;
                 let expected = scheduling.periodic.then(|| scheduling.range[1] - scheduling.range[0]);
-                let same = |a: f64, b: f64| (a - b).abs() <= SAME * b.abs();
-                let is_same = match (*period, expected) {
-                    (Some(found), Some(expected)) => same(found, expected),
-                    (found, expected) => found == expected,
-                };
-                if !is_same || gains.len() != parameters.len() {
+                if *period != expected || gains.len() != parameters.len() {
                     return refuse(
                         "controller.schedule",
                         "does not fit the grid",
@@ -233,7 +232,15 @@ pub(super) fn symmetric(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(),
     let Some((i, j)) = asymmetry(matrix) else { return Ok(()) };
     refuse(
         key,
-        format!("has {} in row {}, column {}, and {} in row {}, column {}", matrix[(i, j)], i + 1, j + 1, matrix[(j, i)], j + 1, i + 1),
+        format!(
+            "has {} in row {}, column {}, and {} in row {}, column {}",
+            matrix[(i, j)],
+            i + 1,
+            j + 1,
+            matrix[(j, i)],
+            j + 1,
+            i + 1
+        ),
         "symmetric, the two the same number to the last digit",
     )
 }
@@ -241,7 +248,9 @@ pub(super) fn symmetric(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(),
 /// Symmetric and ≻ 0, or ⪰ 0 where that is enough.
 fn definite(key: &str, matrix: &Mat<f64>, size: usize, or_singular: bool) -> Result<(), DesignError> {
     symmetric(key, matrix, size)?;
-    let found = |what: &str| format!("is {what}: its smallest eigenvalue is about {}", about(smallest_eigenvalue_about(matrix)));
+    let found = |what: &str| {
+        format!("is {what}: its smallest eigenvalue is about {}", about(smallest_eigenvalue_about(matrix)))
+    };
     match definiteness(matrix) {
         Some(Definiteness::Positive) => Ok(()),
         Some(Definiteness::Semidefinite) if or_singular => Ok(()),
@@ -255,7 +264,15 @@ fn definite(key: &str, matrix: &Mat<f64>, size: usize, or_singular: bool) -> Res
 /// The grid has to be the plant's of as many points, which a design covers its whole range with.
 fn same_grid(key: &str, found: &[f64], scheduling: Option<&Scheduling>) -> Result<(), DesignError> {
     let expected = parameter_grid(scheduling, found.len());
-    let is_same = expected.len() == found.len()
-        && expected.iter().zip(found).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()));
-    if is_same { Ok(()) } else { refuse(key, "is not the plant's grid", "equidistant over the range of its parameter") }
+    if expected.len() != found.len() {
+        return refuse(key, format!("has {} values", found.len()), format!("as many as the plant's grid, {}", expected.len()));
+    }
+    match expected.iter().zip(found).position(|(a, b)| a != b) {
+        Some(at) => refuse(
+            key,
+            format!("is not the plant's grid: number {} is {}", at + 1, found[at]),
+            format!("equidistant over the range of its parameter, here {}", expected[at]),
+        ),
+        None => Ok(()),
+    }
 }

@@ -4,6 +4,7 @@ use super::matrix::{CellMatrix, TaylorMatrix};
 use crate::certificate::claim::Motion;
 use crate::controller::{InputLimits, Schedule};
 use crate::math::Mat;
+use crate::math::definite::asymmetry;
 use crate::math::interval::Interval;
 use crate::math::matrix::{inverse_spd, quadratic_form};
 use crate::math::taylor::Taylor;
@@ -37,6 +38,15 @@ pub enum Unprovable {
     /// The design carries nothing between its grid points that could be proved.
     #[error("its auxiliary gain is missing between the grid points")]
     NoAuxiliaryGain,
+    /// V is not a quadratic form of the numbers given.
+    #[error("its P or Y is not symmetric to the last digit")]
+    NotSymmetric,
+    /// The saturated input is never u*, and x* no point of rest.
+    #[error("the limits of input {input} do not enclose its operating value")]
+    OutsideLimits {
+        /// From 1.
+        input: usize,
+    },
 }
 
 /// Everything that the claims are about.
@@ -103,6 +113,7 @@ pub(super) struct Parts {
 impl<'a> ClosedLoop<'a> {
     /// Of a design, for the plant that it names.
     pub fn new(design: &'a Design, plant: &'a dyn Plant) -> Result<Self, Unprovable> {
+        refuse_unusable(design)?;
         let schedule = &design.controller.schedule;
         let scheduling = plant.description().scheduling.as_ref();
         let first = design.points[0].rho;
@@ -383,6 +394,22 @@ impl<'a> ClosedLoop<'a> {
                 (0..y.nrows()).map(|i| (0..y.ncols()).map(|j| y[(i, j)] * direction[j]).sum()).collect()
             }
         }
+    }
+}
+
+/// What no file that was validated has, and a design made in memory might.
+fn refuse_unusable(design: &Design) -> Result<(), Unprovable> {
+    let y = design.rate_bounded.iter().flat_map(|bounded| &bounded.y.coefficients);
+    if design.points.iter().map(|point| &point.p).chain(y).any(|matrix| asymmetry(matrix).is_some()) {
+        return Err(Unprovable::NotSymmetric);
+    }
+    let (limits, operating) = (&design.controller.limits, &design.controller.operating_input);
+    let encloses = |i: usize| {
+        limits.min[i].is_none_or(|min| min <= operating[i]) && limits.max[i].is_none_or(|max| max >= operating[i])
+    };
+    match (0..operating.len()).find(|&i| !encloses(i)) {
+        Some(i) => Err(Unprovable::OutsideLimits { input: i + 1 }),
+        None => Ok(()),
     }
 }
 

@@ -61,7 +61,8 @@ pub fn prove_gain(model: &InputOutputModel, bound: &GainBound) -> Claim {
             break;
         }
     }
-    let (gain, attempt) = first.unwrap_or((bound.gain, Attempt::Open { place: Place { piece: 0, variant: 0, middle: 0.0, half: 1.0 } }));
+    let (gain, attempt) =
+        first.unwrap_or((bound.gain, Attempt::Open { place: Place { piece: 0, variant: 0, middle: 0.0, half: 1.0 } }));
     let motion = bound.rate.map_or(Motion::Any, |rate| Motion::Bounded { rate });
     let parameter = |place: &Place| low + place.middle * step.middle();
     let mut claim = Claim::new(ClaimKind::InducedGain { gain, motion }, Of::Model, &Words::default());

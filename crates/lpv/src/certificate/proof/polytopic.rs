@@ -18,6 +18,7 @@ use super::witness::{Broken, Loop, form, image, inverse};
 use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Witness, Words, settle};
 use crate::math::Mat;
 use crate::math::decimal::at_least;
+use crate::math::definite::asymmetry;
 use crate::math::interval::Interval;
 use crate::math::matrix::symmetric_part;
 use crate::math::taylor::Taylor;
@@ -48,6 +49,16 @@ pub enum PolytopicLyapunov {
         /// νₖ, each with a rate for each vertex.
         rate_vertices: Vec<Vec<f64>>,
     },
+}
+
+impl PolytopicLyapunov {
+    /// P, or the Yᵢ.
+    fn matrices(&self) -> &[Mat<f64>] {
+        match self {
+            Self::Common { p, .. } => std::slice::from_ref(p),
+            Self::ParameterDependent { y, .. } => y,
+        }
+    }
 }
 
 /// What is to be proved over a polytope.
@@ -85,9 +96,8 @@ pub fn prove_polytopic(claim: &PolytopicClaim) -> Vec<Claim> {
     };
     claims.push(sums.decrease(decrease, level, None));
     if let Some(weights) = &claim.weights {
-        let of_factor = |factor: f64| {
-            sums.decrease(ClaimKind::Cost { factor, level, motion }, level, Some((factor, weights)))
-        };
+        let of_factor =
+            |factor: f64| sums.decrease(ClaimKind::Cost { factor, level, motion }, level, Some((factor, weights)));
         let attempts: Vec<Claim> = COST_FACTORS.into_iter().map(of_factor).collect();
         let proved = attempts.iter().position(|claim| claim.verdict == Verdict::Proved).unwrap_or(0);
         claims.extend(attempts.into_iter().nth(proved));
@@ -194,6 +204,11 @@ impl<'a> Sums<'a> {
             rates: Vec::new(),
             mixture: 0,
         };
+        if self.claim.lyapunov.matrices().iter().any(|matrix| asymmetry(matrix).is_some()) {
+            // V is not a quadratic form of these numbers
+            let claim = Claim::new(ClaimKind::LyapunovDefinite, Of::Model, &words());
+            return claim.decided(Verdict::Undecided, f64::NAN, "P or Y is not symmetric to the last digit");
+        }
         let conditions: Vec<Condition> = self.lyapunov.iter().enumerate().map(at).collect();
         decide(ClaimKind::LyapunovDefinite, Instant::now(), &conditions, |condition, direction, value| {
             Some(condition.witness(self.state(&condition.weights, direction), value))

@@ -12,7 +12,9 @@ pub(super) fn claim(weights: &CostWeights, words: &Words) -> Claim {
     let [q, r] = [&weights.q, &weights.r].map(smallest_eigenvalue_about);
     let detail = format!("smallest eigenvalues about {} of Q and {} of R", about(q), about(r));
     let (verdict, margin) = match (definiteness(&weights.q), definiteness(&weights.r)) {
-        (Some(Definiteness::Positive | Definiteness::Semidefinite), Some(Definiteness::Positive)) => (Verdict::Proved, r),
+        (Some(Definiteness::Positive | Definiteness::Semidefinite), Some(Definiteness::Positive)) => {
+            (Verdict::Proved, r)
+        }
         (Some(_), Some(_)) => (Verdict::Refuted, q.min(r)),
         _ => (Verdict::Undecided, f64::NAN),
     };

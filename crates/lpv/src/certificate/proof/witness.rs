@@ -53,12 +53,17 @@ pub(super) struct Broken {
 impl Loop {
     /// A state whose cost exceeds `factor` V(x₀), if one is found and proved.
     pub fn exceeds_cost(&self, factor: f64) -> Option<Broken> {
-        let (a, w, p) = (middle(&self.flow), symmetric_part(&middle(&self.stage)), symmetric_part(&middle(&self.lyapunov)));
+        let (a, w, p) =
+            (middle(&self.flow), symmetric_part(&middle(&self.stage)), symmetric_part(&middle(&self.lyapunov)));
         if !is_positive(&self.stage) || self.limited && !self.is_stable(&a) {
             return None;
         }
         let of_rest = if spectral_abscissa(&a) < 0.0 { lyapunov::solve(&a, &w) } else { None };
-        of_rest.into_iter().chain(finite_horizons(&a, &w)).filter(is_finite).find_map(|x| self.broken_by(&x, &p, factor))
+        of_rest
+            .into_iter()
+            .chain(finite_horizons(&a, &w))
+            .filter(is_finite)
+            .find_map(|x| self.broken_by(&x, &p, factor))
     }
 
     /// With a cost matrix near `x`.
@@ -196,7 +201,13 @@ impl ClosedLoop<'_> {
     pub fn witness(&self, attempt: &Attempt) -> Option<Witness> {
         let Attempt::Refuted { place, rate, direction, value } = attempt else { return None };
         let state = self.state(place.middle, direction);
-        Some(Witness { parameter: self.parameter(place.middle), rate: *rate, state, value: *value, ..Witness::default() })
+        Some(Witness {
+            parameter: self.parameter(place.middle),
+            rate: *rate,
+            state,
+            value: *value,
+            ..Witness::default()
+        })
     }
 
     /// The witness that the low gain passes a limit in the set: the direction (a, y) of the bordered matrix has
@@ -237,7 +248,13 @@ impl ClosedLoop<'_> {
         }
         let scale = level.map_or(1.0, |level| (level / size.middle()).sqrt());
         let state = self.state(place.middle, direction).iter().map(|x| scale * x).collect();
-        Some(Witness { parameter: self.parameter(place.middle), rate: *rate, state, value: *value, ..Witness::default() })
+        Some(Witness {
+            parameter: self.parameter(place.middle),
+            rate: *rate,
+            state,
+            value: *value,
+            ..Witness::default()
+        })
     }
 
     /// The unsaturated loop in the middle of a place.
