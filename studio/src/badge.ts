@@ -16,7 +16,17 @@ const VERDICT_SIGN: Record<Verdict, string> = { proved: "✓", numerical: "≈",
 
 /** A chip with the verdict: sign, word and colour. */
 export function verdictChip(verdict: Verdict): HTMLElement {
-  return el("span", { class: `chip chip-${verdict}`, title: `${verdict}: ${VERDICT_MEANING[verdict]}` }, el("span", { class: "chip-sign", "aria-hidden": "true" }, VERDICT_SIGN[verdict]), verdict);
+  return el("span", { class: `chip chip-${verdict}`, title: `${verdict}: ${VERDICT_MEANING[verdict]}` }, ...chipFace(verdict));
+}
+
+/** The chip as a button that opens what the verdict rests on; `purpose` is for those who do not see where it stands. */
+export function verdictButton(verdict: Verdict, purpose: string): HTMLButtonElement {
+  const attributes = { type: "button", class: `chip chip-button chip-${verdict}`, title: `${verdict}: ${VERDICT_MEANING[verdict]}. Click for what it rests on`, "aria-label": `${verdict}; ${purpose}` };
+  return el("button", attributes, ...chipFace(verdict), el("span", { class: "chip-arrow", "aria-hidden": "true" }));
+}
+
+function chipFace(verdict: Verdict): (Node | string)[] {
+  return [el("span", { class: "chip-sign", "aria-hidden": "true" }, VERDICT_SIGN[verdict]), verdict];
 }
 
 /** A, B, … Z, then AA, AB, …: the run's name where there is room for one letter. */

@@ -1,9 +1,10 @@
 // What was checked about each design, and the notes.
 
-import { letterBadge, verdictChip } from "./badge";
+import { letterBadge } from "./badge";
 import type { Report, Run } from "./data";
 import { el } from "./dom";
-import { seconds } from "./format";
+import { claimList } from "./evidence";
+import { about } from "./format";
 import type { Theme } from "./theme";
 
 export function checksSection(report: Report, theme: Theme): HTMLElement {
@@ -18,14 +19,10 @@ function runChecks(report: Report, run: Run, theme: Theme): HTMLElement {
   const bad = run.outcome.kind === "diverged" || run.claims.some((c) => c.verdict === "refuted");
   return el(
     "details",
-    { class: "panel check-run", open: bad },
+    { class: "panel check-run", open: bad, "data-run": run.id },
     el("summary", {}, letterBadge(report, run, theme), el("b", {}, run.label), el("span", { class: "muted" }, summary)),
-    run.outcome.kind === "diverged" && el("p", { class: "outcome-bad" }, `Diverged at ${seconds(run.outcome.time_s)} in ${run.outcome.state}. ${run.outcome.detail}`),
-    el(
-      "ul",
-      { class: "claims" },
-      ...run.claims.map((claim) => el("li", {}, verdictChip(claim.verdict), el("div", {}, el("div", { class: "claim" }, claim.claim), claim.detail !== "" && el("div", { class: "run-sub" }, claim.detail)))),
-    ),
+    run.outcome.kind === "diverged" && el("p", { class: "outcome-bad" }, `Diverged at ${about(run.outcome.time_s)} s in ${run.outcome.state}. ${run.outcome.detail}`),
+    claimList({ report, run }, run.claims),
   );
 }
 

@@ -35,14 +35,51 @@ export interface Plant {
   states: Channel[];
   inputs: Channel[];
   outputs: Channel[];
+  /** Whether its linear model leaves nothing out. */
+  linear: boolean;
   scene: RigidBody | null;
 }
 
-/** One claim about a design, as the certificate decided it. */
+/** How the parameter may move, as far as a claim says. */
+export type Motion = { motion: "none" | "at-rest" | "hull" | "any" } | { motion: "bounded"; rate: number };
+
+/** A state whose own motion breaks a claim, at this parameter and rate. */
+export interface Witness {
+  parameter: number | null;
+  rate: number | null;
+  /** The states; of a matrix with a border a direction, the border first. */
+  state: (number | null)[];
+}
+
+/** One claim about a design or a flight, as the certificate decided it. */
 export interface Claim {
+  /** Its name among the run's claims, such as `inner[0].unsaturated`; claims about steps of a flight share one. */
+  id: string;
+  /** What is claimed: `cost`, `invariance`, …; the fields below that it has depend on it. */
+  kind: string;
+  /** The system that it is about: the LPV model or the nonlinear plant. */
+  of: "model" | "plant";
+  /** The statement. */
   claim: string;
+  /** Ids of the claims that it rests on. */
+  premises: string[];
   verdict: Verdict;
+  /** By how much it holds or, negative, fails; null where that is not known. */
+  margin: number | null;
+  /** Parameter at which the margin is attained, or the check stopped. */
+  at: number | null;
   detail: string;
+  witness?: Witness;
+  /** Cells of the parameter's range that a proof took. */
+  cells: number;
+  /** γ of the set {V ≤ γ}; null where there is none. */
+  level?: number | null;
+  /** The cost is at most this times V at the start. */
+  factor?: number;
+  motion?: Motion;
+  sample_time_s?: number;
+  /** Bound on the cost of a step. */
+  bound?: number;
 }
 
 /** How a simulation ended. */
@@ -76,6 +113,10 @@ export interface Run {
   /** What is known of the design, whatever it flies. */
   verdict: Verdict;
   claims: Claim[];
+  /** What proves the claims about the design again, for a shell. */
+  certify_command: string;
+  /** The largest rate of the parameter for which set and cost bound are proved, 0 at rest; null where they are not. */
+  proved_rate: number | null;
   outcome: Outcome;
   /** Upper bound on the cost of this flight, or null; worth what its verdict says, under the condition in the note. */
   guaranteed_cost: number | null;
@@ -114,6 +155,7 @@ export interface Report {
   description: string;
   version: string;
   seed: number;
+  sample_time_s: number;
   plant: Plant;
   scheduling: { parameter: string; unit: string; weights: string[] };
   /** Sample times of all runs, seconds, increasing. */
@@ -167,6 +209,10 @@ class Checker {
 
   number(value: unknown, path: string): void {
     if (typeof value !== "number") this.fail(path, "a number", value);
+  }
+
+  flag(value: unknown, path: string): void {
+    if (typeof value !== "boolean") this.fail(path, "true or false", value);
   }
 
   numberOrNull(value: unknown, path: string): void {
@@ -233,21 +279,48 @@ interface Sizes {
   samples: number;
 }
 
+const MOTIONS: readonly unknown[] = ["none", "at-rest", "bounded", "hull", "any"];
+
+function checkClaim(check: Checker, value: unknown, path: string): void {
+  const claim = check.dict(value, path);
+  if (!claim) return;
+  for (const key of ["id", "kind", "claim", "detail"]) check.text(claim[key], `${path}.${key}`);
+  if (claim.of !== "model" && claim.of !== "plant") check.fail(`${path}.of`, '"model" or "plant"', claim.of);
+  check.list(claim.premises, `${path}.premises`).forEach((id, i) => check.text(id, `${path}.premises[${i}]`));
+  check.verdict(claim.verdict, `${path}.verdict`);
+  // numbers that are not finite are null in JSON
+  for (const key of ["margin", "at"]) check.numberOrNull(claim[key], `${path}.${key}`);
+  check.number(claim.cells, `${path}.cells`);
+  for (const key of ["level", "factor", "sample_time_s", "bound"]) {
+    if (claim[key] !== undefined) check.numberOrNull(claim[key], `${path}.${key}`);
+  }
+  if (claim.motion !== undefined) checkMotion(check, claim.motion, `${path}.motion`);
+  if (claim.witness !== undefined) checkWitness(check, claim.witness, `${path}.witness`);
+}
+
+function checkMotion(check: Checker, value: unknown, path: string): void {
+  const motion = check.dict(value, path);
+  if (!motion) return;
+  if (!MOTIONS.includes(motion.motion)) check.fail(`${path}.motion`, `one of ${MOTIONS.join(", ")}`, motion.motion);
+  if (motion.motion === "bounded") check.number(motion.rate, `${path}.rate`);
+}
+
+function checkWitness(check: Checker, value: unknown, path: string): void {
+  const witness = check.dict(value, path);
+  if (!witness) return;
+  for (const key of ["parameter", "rate"]) check.numberOrNull(witness[key], `${path}.${key}`);
+  check.list(witness.state, `${path}.state`).forEach((v, i) => check.numberOrNull(v, `${path}.state[${i}]`));
+}
+
 function checkRun(check: Checker, value: unknown, path: string, size: Sizes): void {
   const run = check.dict(value, path);
   if (!run) return;
-  for (const key of ["id", "label", "controller", "guaranteed_cost_note"]) check.text(run[key], `${path}.${key}`);
+  for (const key of ["id", "label", "controller", "certify_command", "guaranteed_cost_note"]) check.text(run[key], `${path}.${key}`);
   for (const key of ["color_index", "peak_input", "saturated_share"]) check.number(run[key], `${path}.${key}`);
-  for (const key of ["guaranteed_cost", "actual_cost", "settling_time_s"]) check.numberOrNull(run[key], `${path}.${key}`);
+  for (const key of ["guaranteed_cost", "actual_cost", "settling_time_s", "proved_rate"]) check.numberOrNull(run[key], `${path}.${key}`);
   check.verdict(run.verdict, `${path}.verdict`);
   check.verdict(run.guaranteed_cost_verdict, `${path}.guaranteed_cost_verdict`);
-  check.list(run.claims, `${path}.claims`).forEach((item, i) => {
-    const claim = check.dict(item, `${path}.claims[${i}]`);
-    if (!claim) return;
-    check.text(claim.claim, `${path}.claims[${i}].claim`);
-    check.text(claim.detail, `${path}.claims[${i}].detail`);
-    check.verdict(claim.verdict, `${path}.claims[${i}].verdict`);
-  });
+  check.list(run.claims, `${path}.claims`).forEach((item, i) => checkClaim(check, item, `${path}.claims[${i}]`));
   const outcome = check.dict(run.outcome, `${path}.outcome`);
   if (outcome && outcome.kind === "diverged") {
     check.number(outcome.time_s, `${path}.outcome.time_s`);
@@ -297,7 +370,7 @@ export function parseReport(text: string): Report {
   if (report.schema !== SCHEMA) throw new DataError([`schema: this page reads ${SCHEMA}, the data are ${describe(report.schema)}. Page and program must be of one version.`]);
 
   for (const key of ["title", "scenario", "description", "version"]) check.text(report[key], key);
-  check.number(report.seed, "seed");
+  for (const key of ["seed", "sample_time_s"]) check.number(report[key], key);
   const size: Sizes = { states: 0, inputs: 0, outputs: 0, weights: 0, samples: 0 };
   const plant = check.dict(report.plant, "plant");
   if (plant) {
@@ -305,6 +378,7 @@ export function parseReport(text: string): Report {
     size.states = check.channels(plant.states, "plant.states");
     size.inputs = check.channels(plant.inputs, "plant.inputs");
     size.outputs = check.channels(plant.outputs, "plant.outputs");
+    check.flag(plant.linear, "plant.linear");
     checkScene(check, plant.scene, size.states);
   }
   const scheduling = check.dict(report.scheduling, "scheduling");

@@ -1,5 +1,6 @@
 // Numbers, units and symbols as a reader expects them.
 
+import { decimal } from "./decimal";
 import { el } from "./dom";
 
 const MINUS = "\u2212";
@@ -10,18 +11,33 @@ const GREEK: Record<string, string> = {
   xi: "ξ", rho: "ρ", sigma: "σ", tau: "τ", phi: "φ", chi: "χ", psi: "ψ", omega: "ω",
 };
 
-/** A number with `digits` significant digits; powers of ten only where plain digits would mislead. */
-export function number(value: number, digits = 4): string {
-  if (!Number.isFinite(value)) return value > 0 ? "∞" : value < 0 ? `${MINUS}∞` : "–";
-  if (value === 0) return "0";
-  const size = Math.abs(value);
-  if (size >= 1e6 || size < 1e-4) {
-    const [mantissa, exponent] = value.toExponential(Math.max(0, digits - 2)).split("e");
-    const power = [...String(Number(exponent))].map((c) => SUPERSCRIPTS[c]).join("");
-    return `${minus(mantissa!)}\u202f×\u202f10${power}`;
-  }
-  const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
-  return minus(value.toFixed(Math.min(decimals, 8)));
+/** Digits of a bound, as everywhere in the program. */
+const DIGITS = 5;
+
+/** Of what holds up to a number: rates, levels, regions, margins. Never above it. */
+export function atLeast(value: number): string {
+  return typeset(decimal(value, DIGITS, "down"));
+}
+
+/** Of what is at most a number: costs, gains, times, errors. Never below it. */
+export function atMost(value: number): string {
+  return typeset(decimal(value, DIGITS, "up"));
+}
+
+/** Of what claims nothing: measured, sampled, configured. */
+export function about(value: number): string {
+  return typeset(decimal(value, DIGITS, "nearest"));
+}
+
+/** A plain decimal as a reader expects it: −1.2 × 10⁻⁸. */
+function typeset(text: string): string {
+  if (text === "NaN") return "–";
+  const [mantissa, exponent] = text.replace("inf", "∞").split("e");
+  return exponent === undefined ? minus(mantissa!) : `${minus(mantissa!)}\u202f×\u202f10${superscript(exponent)}`;
+}
+
+function superscript(exponent: string): string {
+  return [...exponent].map((c) => SUPERSCRIPTS[c]).join("");
 }
 
 /** A number with a fixed count of decimals. */
@@ -71,6 +87,12 @@ function symbolParts(name: string): [string, string] {
 export function symbol(name: string): HTMLElement {
   const [base, index] = symbolParts(name);
   return el("span", { class: "symbol" }, el("i", {}, base), index !== "" && el("sub", {}, index));
+}
+
+/** The rate of a signal: its letter with a dot, |d name/dt| where the name is a word. */
+export function rateText(name: string): string {
+  const [base, index] = symbolParts(name);
+  return [...base].length === 1 && index === "" ? `|${base}\u0307|` : `|d${symbolText(name)}/dt|`;
 }
 
 /** A signal's name as plain text, for readers without a screen. */

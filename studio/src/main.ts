@@ -2,6 +2,7 @@
 
 import { checksSection, notesSection } from "./checks";
 import { DataError, parseReport, type Report, type Run } from "./data";
+import { closePanel } from "./disclosure";
 import { el } from "./dom";
 import * as figures from "./figures";
 import { opening } from "./flight";
@@ -21,7 +22,7 @@ function showPage(app: HTMLElement, report: Report): void {
   const selection = new Selection();
   const timeline = new Timeline(report.time[0]!, report.time.at(-1)!, opening(report));
   addEventListener("keydown", (event) => {
-    if (event.key === "Escape") selection.select(null);
+    if (event.key === "Escape" && !closePanel()) selection.select(null);
   });
   const board = new PlotBoard(report, timeline, selection, theme);
 

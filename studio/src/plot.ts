@@ -6,7 +6,7 @@
 import uPlot from "uplot";
 import type { Report, Run, Series } from "./data";
 import { el } from "./dom";
-import { fixed, number } from "./format";
+import { about, fixed } from "./format";
 import type { PlotBoard } from "./plots";
 import { verticalRange } from "./range";
 import { lastIndex } from "./samples";
@@ -218,7 +218,7 @@ export class Plot {
     const range = verticalRange(lines, from, to, limits, this.board.fullRange);
     const notes: string[] = [];
     if (this.spec.note) notes.push(this.spec.note);
-    if (limits.length > 0) notes.push(`limits ${limits.map((v) => number(v, 3)).join(", ")}`);
+    if (limits.length > 0) notes.push(`limits ${limits.map(about).join(", ")}`);
     if (range.clipped.length > 0) notes.push(`${[...new Set(range.clipped)].map((run) => this.board.letter(run)).join(", ")} off scale`);
     this.note.textContent = notes.join(" · ");
     return [range.low, range.high];

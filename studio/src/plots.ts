@@ -3,7 +3,7 @@
 import { letter } from "./badge";
 import type { Report, Run } from "./data";
 import { el } from "./dom";
-import { number, seconds } from "./format";
+import { about } from "./format";
 import { Plot, type Curve, type PlotSpec } from "./plot";
 import { indexNearest } from "./samples";
 import type { Selection } from "./selection";
@@ -121,7 +121,7 @@ export class PlotBoard {
     }
     const i = indexNearest(this.report.time, t);
     const row = (name: string, color: string, values: (number | null | undefined)[]): HTMLElement =>
-      el("tr", {}, el("th", { style: `color: ${color}` }, name), ...values.map((v) => el("td", {}, v === null || v === undefined ? "–" : number(v, 4))));
+      el("tr", {}, el("th", { style: `color: ${color}` }, name), ...values.map((v) => el("td", {}, v === null || v === undefined ? "–" : about(v))));
     const rows = [...plot.spec.curves]
       .sort((a, b) => this.order(a) - this.order(b))
       .filter((c) => c.run === null || this.selection.isVisible(c.run))
@@ -129,7 +129,7 @@ export class PlotBoard {
         const name = this.curveName(c, plot.spec);
         return name === null ? [] : [row(name, c.run ? this.theme.color(c.run) : "inherit", [c.values[i]])];
       });
-    this.tip.replaceChildren(el("div", { class: "tip-time" }, seconds(this.report.time[i]!, 2)), el("table", {}, ...rows));
+    this.tip.replaceChildren(el("div", { class: "tip-time" }, `${about(this.report.time[i]!)} s`), el("table", {}, ...rows));
     this.tip.hidden = false;
     const { offsetWidth: width, offsetHeight: height } = this.tip;
     const left = x + 18 + width > innerWidth ? x - 18 - width : x + 18;

@@ -1,17 +1,19 @@
 //! `report.html`: the web page with the run's data put into it.
 
-use crate::designs::CheckedDesign;
+use crate::designs::{CheckedDesign, file_name};
 use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::record::bound_verdict;
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::StepStay;
-use lpv::certificate::{Claim, StepBound, UnmetCondition, Verdict};
+use lpv::certificate::{Claim, ClaimKind, Member, Motion, Of, StepBound, Subject, UnmetCondition, Verdict};
+use lpv::math::decimal::{Rounding, at_most, decimal};
 use lpv::model::BoxWeights;
-use lpv::plant::{Description, Scene};
+use lpv::plant::{Description, PlantSpec, Scene};
 use lpv::sim::{Outcome, Trajectory};
 use lpv::synthesis::Method;
 use serde::Serialize;
+use std::path::Path;
 
 /// The page, built from `studio/` (or the plain page where npm was missing).
 const PAGE: &str = include_str!(concat!(env!("OUT_DIR"), "/report.html"));
@@ -30,6 +32,8 @@ struct Report<'a> {
     description: &'a str,
     version: &'static str,
     seed: u64,
+    /// Between samples the controllers hold their inputs.
+    sample_time_s: f64,
     plant: PlantData<'a>,
     scheduling: SchedulingData,
     time: Vec<f64>,
@@ -45,6 +49,8 @@ struct PlantData<'a> {
     states: &'a [lpv::plant::Signal],
     inputs: &'a [lpv::plant::Signal],
     outputs: &'a [lpv::plant::Signal],
+    /// Whether its linear model leaves nothing out.
+    linear: bool,
     scene: Option<&'a Scene>,
 }
 
@@ -69,6 +75,10 @@ struct RunData<'a> {
     controller: String,
     verdict: Verdict,
     claims: Vec<&'a Claim>,
+    /// What proves the claims about the design again.
+    certify_command: String,
+    /// [`proved_rate`]
+    proved_rate: Option<f64>,
     outcome: OutcomeData,
     guaranteed_cost: Option<f64>,
     guaranteed_cost_verdict: Verdict,
@@ -110,10 +120,15 @@ struct EstimationData {
     inside_share: Vec<f64>,
 }
 
-/// The page for a run.
-pub fn html(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> Result<String, Failure> {
-    let data =
-        serde_json::to_string(&report(scenario, designs, flights)).map_err(|error| Failure::serialisation(&error))?;
+/// The page for a run whose designs lie in `folder`.
+pub fn html(
+    scenario: &Scenario,
+    designs: &[CheckedDesign],
+    flights: &[Flown],
+    folder: &Path,
+) -> Result<String, Failure> {
+    let report = report(scenario, designs, flights, folder);
+    let data = serde_json::to_string(&report).map_err(|error| Failure::serialisation(&error))?;
     if !PAGE.contains(PLACEHOLDER) {
         return Err(Failure::Defect("the report page has no place for its data".into()));
     }
@@ -122,7 +137,7 @@ pub fn html(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -
     Ok(PAGE.replacen(PLACEHOLDER, &data.replace('<', "\\u003c"), 1))
 }
 
-fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a [Flown]) -> Report<'a> {
+fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a [Flown], folder: &Path) -> Report<'a> {
     let description = scenario.plant.description();
     let samples = (scenario.duration_s / scenario.sample_time_s).round() as usize + 1;
     let shown: Vec<usize> = (0..samples).step_by(samples.div_ceil(SAMPLES)).collect();
@@ -130,6 +145,14 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
     let moved = scenario.reference.moved_states();
     let references: Vec<Vec<f64>> = time.iter().map(|&t| scenario.reference.at(t)).collect();
     let weights = description.scheduling.as_ref().map(|scheduling| BoxWeights::new(&scheduling.features));
+    let mut runs: Vec<RunData> = (scenario.controllers.iter().zip(designs).zip(flights).enumerate())
+        .map(|(k, ((plan, checked), flown))| RunData {
+            certify_command: certify_command(folder, &plan.request.name),
+            ..run(description, &shown, weights.as_ref(), k, plan, checked, flown)
+        })
+        .collect();
+    // what is proved throughout leads, and letters follow; colours stay those of the scenario's order
+    runs.sort_by_key(|run| !is_proved_throughout(&run.claims));
     Report {
         schema: "lpv-report/1",
         title: &scenario.title,
@@ -137,11 +160,13 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
         description: &scenario.description,
         version: env!("CARGO_PKG_VERSION"),
         seed: scenario.seed,
+        sample_time_s: scenario.sample_time_s,
         plant: PlantData {
             name: &description.name,
             states: &description.states,
             inputs: &description.inputs,
             outputs: &description.outputs,
+            linear: matches!(scenario.plant_spec, PlantSpec::Linear(_) | PlantSpec::DoubleIntegrator {}),
             scene: description.scene.as_ref(),
         },
         scheduling: SchedulingData {
@@ -159,9 +184,7 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
         steps: (scenario.reference.set_points().iter().zip(&scenario.set_point_labels))
             .map(|(set_point, label)| StepData { time_s: set_point.time_s, label })
             .collect(),
-        runs: (scenario.controllers.iter().zip(designs).zip(flights).enumerate())
-            .map(|(k, ((plan, checked), flown))| run(description, &shown, weights.as_ref(), k, plan, checked, flown))
-            .collect(),
+        runs,
         notes: notes(scenario, designs, flights),
     }
 }
@@ -190,6 +213,8 @@ fn run<'a>(
         controller: controller_line(plan),
         verdict: checked.verdict(),
         claims: checked.claims.iter().chain(&flown.claims).collect(),
+        certify_command: String::new(),
+        proved_rate: proved_rate(checked),
         outcome: match flown.flight.outcome {
             Outcome::Completed => OutcomeData::Completed,
             Outcome::EstimatorDiverged { time_s } => OutcomeData::Diverged {
@@ -242,6 +267,57 @@ fn run<'a>(
     }
 }
 
+/// What proves the claims about a controller's design in `folder` again.
+fn certify_command(folder: &Path, controller: &str) -> String {
+    let file = folder.join(file_name(controller)).display().to_string();
+    // a file is no option
+    let file = if file.starts_with('-') { format!("./{file}") } else { file };
+    match file.chars().all(|c| c.is_alphanumeric() || "/._-+=:@%,".contains(c)) {
+        true => format!("lpv certify {file}"),
+        false => format!("lpv certify '{}'", file.replace('\'', "'\\''")),
+    }
+}
+
+/// The largest rate of the parameter for which every set of the design is proved invariant (or V to decrease) and the cost
+/// bound from it is proved; 0 is at rest. `None` where one of these is not proved, or there is no parameter.
+fn proved_rate(checked: &CheckedDesign) -> Option<f64> {
+    let mut members = std::iter::once(Member::Outer).chain((0..checked.design.inner.len()).map(Member::Inner));
+    let least = members.try_fold(f64::INFINITY, |least, member| Some(least.min(member_rate(&checked.claims, member)?)));
+    least.filter(|rate| rate.is_finite())
+}
+
+/// The same of one member; infinite where no rate matters.
+fn member_rate(claims: &[Claim], member: Member) -> Option<f64> {
+    let subject = Subject { of: Of::Model, member };
+    let proved = || claims.iter().filter(|claim| claim.id.subject == subject && claim.verdict == Verdict::Proved);
+    let rate = |motion: &Motion| match motion {
+        Motion::AtRest => 0.0,
+        Motion::Bounded { rate } => *rate,
+        Motion::None | Motion::Hull | Motion::Any => f64::INFINITY,
+    };
+    let stays = |claim: &Claim| match &claim.kind {
+        ClaimKind::Invariance { level, motion } => Some((Some(*level), rate(motion))),
+        ClaimKind::Decrease { motion } => Some((None, rate(motion))),
+        _ => None,
+    };
+    let costs = |claim: &Claim| match &claim.kind {
+        ClaimKind::Cost { level, motion, .. } => Some((*level, rate(motion))),
+        _ => None,
+    };
+    // both of one set
+    let of_set = |(level, bounded): (Option<f64>, f64)| {
+        let kept = proved().filter_map(stays).filter(move |(other, _)| *other == level);
+        kept.map(move |(_, rate)| rate.min(bounded))
+    };
+    proved().filter_map(costs).flat_map(of_set).reduce(f64::max)
+}
+
+/// Whether every claim is proved, of the design and of each step. That a flight kept to its rate is looked up, never proved.
+fn is_proved_throughout(claims: &[&Claim]) -> bool {
+    let mut proofs = claims.iter().filter(|claim| !matches!(claim.kind, ClaimKind::RateKept { .. })).peekable();
+    proofs.peek().is_some() && proofs.all(|claim| claim.verdict == Verdict::Proved)
+}
+
 fn estimation_errors(description: &Description, shown: &[usize], trajectory: &Trajectory) -> Vec<Series> {
     let errors: Vec<Vec<f64>> = (trajectory.estimates.iter().zip(&trajectory.states))
         .map(|(estimate, state)| {
@@ -258,9 +334,10 @@ pub fn bound_note(flown: &Flown) -> String {
     if flown.bounds.is_empty() && !flown.stays.is_empty() {
         // below a governor: no bound on the cost, but a certificate of where the error stays
         let steps = flown.stays.iter().enumerate();
+        let share = |step: &StepStay| decimal(step.stay.peak_share, 3, Rounding::Up);
         let spell = |(k, step): (usize, &StepStay)| match step.verdict {
-            Verdict::Proved => format!("step {} certified (V ≤ {:.2} γ)", k + 1, step.stay.peak_share),
-            _ => format!("step {} not certified (V ≤ {:.2} γ)", k + 1, step.stay.peak_share),
+            Verdict::Proved => format!("step {} certified (V ≤ {} γ)", k + 1, share(step)),
+            _ => format!("step {} not certified (V ≤ {} γ)", k + 1, share(step)),
         };
         return steps.map(spell).collect::<Vec<_>>().join("; ");
     }
@@ -280,7 +357,7 @@ pub fn bound_note(flown: &Flown) -> String {
         steps => {
             let spell = |(k, bound): (usize, &StepBound)| match bound.verdict() {
                 Verdict::Numerical | Verdict::Proved => {
-                    format!("step {} ≤ {:.4} {}", k + 1, bound.bound, bound.verdict().word())
+                    format!("step {} ≤ {} {}", k + 1, at_most(bound.bound), bound.verdict().word())
                 }
                 Verdict::Undecided | Verdict::Refuted => format!("step {} {}", k + 1, worth(bound)),
             };
@@ -360,4 +437,63 @@ fn sampled(shown: &[usize], available: usize, value: impl Fn(usize) -> f64) -> S
 /// Six significant digits: below what a plot resolves, and a third of the file.
 fn significant(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lpv::certificate::Words;
+
+    fn claim(kind: ClaimKind, verdict: Verdict) -> Claim {
+        Claim::new(kind, Of::Model, &Words::default()).decided(verdict, 1.0, "")
+    }
+
+    #[test]
+    fn the_proved_rate_is_that_of_set_and_bound() {
+        let stays =
+            |rate, verdict| claim(ClaimKind::Invariance { level: 1.0, motion: Motion::Bounded { rate } }, verdict);
+        let costs = |motion, verdict| claim(ClaimKind::Cost { factor: 1.1, level: Some(1.0), motion }, verdict);
+        let bounded = |rate| Motion::Bounded { rate };
+        let rate = |claims: &[Claim]| member_rate(claims, Member::Outer);
+        use Verdict::{Numerical, Proved, Refuted, Undecided};
+        assert_eq!(rate(&[stays(0.37, Proved), costs(bounded(0.2), Proved)]), Some(0.2));
+        assert_eq!(rate(&[stays(0.37, Proved), costs(bounded(2.0), Proved)]), Some(0.37));
+        assert_eq!(rate(&[stays(0.37, Proved), costs(Motion::AtRest, Proved)]), Some(0.0));
+        assert_eq!(rate(&[stays(0.37, Proved)]), None, "no bound");
+        for verdict in [Numerical, Undecided, Refuted] {
+            assert_eq!(rate(&[stays(0.37, Proved), costs(bounded(0.2), verdict)]), None);
+            assert_eq!(rate(&[stays(0.37, verdict), costs(bounded(0.2), Proved)]), None);
+        }
+        assert_eq!(rate(&[]), None);
+        // another member, or the plant, says nothing of this one
+        let inner = stays(0.37, Proved).of_member(Member::Inner(0));
+        assert_eq!(rate(&[inner, costs(bounded(0.2), Proved)]), None);
+        assert_eq!(rate(&[stays(0.37, Proved).of_plant(), costs(bounded(0.2), Proved)]), None);
+        // nor does another set
+        let elsewhere = claim(ClaimKind::Cost { factor: 1.1, level: Some(0.5), motion: bounded(0.2) }, Proved);
+        assert_eq!(rate(&[stays(0.37, Proved), elsewhere.clone()]), None);
+        assert_eq!(rate(&[stays(0.37, Proved), elsewhere, costs(bounded(0.1), Proved)]), Some(0.1));
+        let decrease = claim(ClaimKind::Decrease { motion: Motion::None }, Proved);
+        let everywhere = claim(ClaimKind::Cost { factor: 1.0, level: None, motion: Motion::None }, Proved);
+        assert_eq!(rate(&[decrease, everywhere]), Some(f64::INFINITY), "no parameter");
+    }
+
+    #[test]
+    fn what_is_proved_throughout_leads() {
+        let set = |verdict| claim(ClaimKind::Unsaturated { level: 1.0 }, verdict);
+        let kept = claim(ClaimKind::RateKept { parameter: "psi".into() }, Verdict::Numerical);
+        let (proved, open) = (set(Verdict::Proved), set(Verdict::Numerical));
+        assert!(is_proved_throughout(&[&proved, &kept]));
+        assert!(!is_proved_throughout(&[&proved, &open]));
+        assert!(!is_proved_throughout(&[&kept]) && !is_proved_throughout(&[]), "nothing is proved");
+    }
+
+    #[test]
+    fn the_command_reaches_the_file_through_a_shell() {
+        let command = |folder: &str| certify_command(Path::new(folder), "a");
+        assert_eq!(command("out/quadrotor"), "lpv certify out/quadrotor/design-a.json");
+        assert_eq!(command("my results"), "lpv certify 'my results/design-a.json'");
+        assert_eq!(command("it's; rm"), "lpv certify 'it'\\''s; rm/design-a.json'");
+        assert_eq!(command("-x"), "lpv certify ./-x/design-a.json");
+    }
 }

@@ -29,7 +29,8 @@ pub struct RunArguments {
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let scenario = Scenario::read(&arguments.scenario)?;
-    let folder = ResultFolder::begin(&scenario.result_folder(arguments.output.out.as_deref()), arguments.output.force)?;
+    let place = scenario.result_folder(arguments.output.out.as_deref());
+    let folder = ResultFolder::begin(&place, arguments.output.force)?;
     let mut checked = designs::design_all(&scenario)?;
     let proofs = match arguments.prove {
         true => designs::prove_all(&scenario, &mut checked),
@@ -47,7 +48,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {
         folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
     }
-    folder.write("report.html", report::html(&scenario, &checked, &flown)?.as_bytes())?;
+    folder.write("report.html", report::html(&scenario, &checked, &flown, &place)?.as_bytes())?;
     let seconds = started.elapsed().as_secs_f64();
     let record = RunRecord::new(&scenario, &checked, &flown, seconds).to_json()?;
     folder.write("run.json", record.as_bytes())?;

@@ -37,7 +37,7 @@ fn without_timings(record: &mut Value) {
     }
 }
 
-/// The files of the result folder `name`, `run.json` without its timings.
+/// The files of the result folder `name`, `run.json` without its timings, the report without the folder's name.
 fn result(place: &Place, name: &str) -> BTreeMap<String, Vec<u8>> {
     let prefix = format!("{name}/");
     let mut files: BTreeMap<String, Vec<u8>> = (place.files().into_iter())
@@ -46,6 +46,10 @@ fn result(place: &Place, name: &str) -> BTreeMap<String, Vec<u8>> {
     let mut record: Value = serde_json::from_slice(&files["run.json"]).unwrap();
     without_timings(&mut record);
     files.insert("run.json".into(), record.to_string().into_bytes());
+    let page = String::from_utf8(files["report.html"].clone()).unwrap();
+    let nameless = page.replace(&format!("lpv certify {prefix}"), "lpv certify ");
+    assert_ne!(page, nameless, "the report says how to prove its claims again");
+    files.insert("report.html".into(), nameless.into_bytes());
     files
 }
 
@@ -359,6 +363,10 @@ fn a_governed_flight_is_certified_and_recorded() {
     let data = report_data(&place.read("out/quadrotor-governed/report.html"));
     assert!(data["runs"][0]["governed"][3].is_array() && data["runs"][0]["set_share"].is_array());
     assert!(data["runs"][1]["governed"].is_null() && data["runs"][1]["set_share"].is_null());
+    assert_eq!(data["runs"][0]["proved_rate"], 0.5, "what both sets and their costs are proved for");
+    assert!(data["runs"][1]["proved_rate"].is_null());
+    let command = "lpv certify out/quadrotor-governed/design-moving.json";
+    assert_eq!(data["runs"][0]["certify_command"], command);
 
     // the saved design flies the same, and is proved again
     let simulated = place.succeed("simulate scenario.toml");
@@ -367,7 +375,7 @@ fn a_governed_flight_is_certified_and_recorded() {
         place.read("out/quadrotor-governed-flights/trajectory-moving.csv"),
         place.read("out/quadrotor-governed/trajectory-moving.csv")
     );
-    let certified = place.succeed("certify out/quadrotor-governed/design-moving.json");
+    let certified = place.succeed(command.trim_start_matches("lpv "));
     assert!(certified.contains("proved: the governed reference moves as the model does"), "{certified}");
     assert!(certified.contains("proved: inner set 1: the set x'P x <= 1 is invariant"), "{certified}");
 }
