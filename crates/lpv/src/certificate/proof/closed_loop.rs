@@ -1,6 +1,7 @@
 //! The closed LPV loop and its Lyapunov function over the continuous range of the parameter, as enclosures on cells.
 
 use super::matrix::{CellMatrix, TaylorMatrix};
+use super::rowwise::MOST_ENUMERATED;
 use crate::certificate::claim::Motion;
 use crate::controller::{InputLimits, Schedule};
 use crate::math::Mat;
@@ -178,9 +179,10 @@ impl<'a> ClosedLoop<'a> {
         (0..self.inputs()).filter(|&i| self.may_saturate(i)).collect()
     }
 
-    /// Number of mixtures of the rows of K and F: two for each input that may saturate.
-    pub fn mixtures(&self) -> usize {
-        1 << self.saturating().len()
+    /// Number of mixtures of the rows of K and F, two for each input that may saturate; `None` where they are too many to enumerate.
+    pub fn mixtures(&self) -> Option<usize> {
+        let count = self.saturating().len();
+        (count <= MOST_ENUMERATED).then(|| 1 << count)
     }
 
     /// How the parameter moves at up to `rate`.
@@ -245,10 +247,15 @@ impl<'a> ClosedLoop<'a> {
 
     /// The parts of the decrease with the mixture number `mixture`, over `t` of piece `piece`.
     pub fn parts(&self, piece: usize, mixture: usize, t: Taylor) -> Parts {
+        self.parts_weighted(piece, mixture, t, &self.weights.r)
+    }
+
+    /// The same with another R.
+    pub fn parts_weighted(&self, piece: usize, mixture: usize, t: Taylor, r: &Mat<f64>) -> Parts {
         let rho = self.rho(t);
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let (a, b, k) = self.model_and_gain(piece, t);
-        let CostWeights { q, r } = self.weights;
+        let CostWeights { q, .. } = self.weights;
         // an input that is not limited is always the one of K
         let saturating = self.saturating();
         let is_saturated =
