@@ -3,10 +3,12 @@
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::{StepStay, step_stays};
 use lpv::certificate::{
-    Claim, ClaimKind, Excursion, Of, Proofs, StepBound, StepConditions, SupervisedProofs, UnmetCondition, Verdict,
-    Words, excursion, lyapunov_value, step_bound,
+    Claim, ClaimKind, Excursion, LyapunovFunction, Of, Proofs, StepBound, StepConditions, SupervisedProofs,
+    UnmetCondition, Verdict, Words, excursion, step_bound,
 };
+use lpv::math::decimal::{about, at_least, at_most};
 use lpv::model::linearize;
+use lpv::plant::Signal;
 use lpv::sim::{Flight, Performance, Simulation, StepResponse, Trajectory, performance};
 use lpv::synthesis::{Design, covering_level};
 use rayon::prelude::*;
@@ -14,6 +16,9 @@ use std::time::Instant;
 
 /// Time between the samples at which it is looked whether a flight is beyond what its bound is for.
 const EXCURSION_STEP_S: f64 = 0.01;
+
+/// By this share a sampled controller may cost more than the bound of one in continuous time before the two are called a contradiction.
+const SAMPLING: f64 = 0.02;
 
 /// A flown controller.
 pub struct Flown {
@@ -24,6 +29,8 @@ pub struct Flown {
     /// What the design says of each step that was reached: a guarantee only where its verdict is `proved`; empty below a
     /// governor, whose steps have no bound on their cost.
     pub bounds: Vec<StepBound>,
+    /// Which system the bounds are of: the LPV model, or the plant where that is linear.
+    pub bounds_are_of: Of,
     /// Whether each step stayed in the certified sets; empty of a controller that does not watch them.
     pub stays: Vec<StepStay>,
     /// A claim for each of these.
@@ -33,6 +40,32 @@ pub struct Flown {
 }
 
 impl Flown {
+    /// What step `k` cost, up to the next one or the end of the flight: less than its cost to infinity.
+    fn cost_of_step(&self, k: usize) -> Option<f64> {
+        let trajectory = &self.flight.trajectory;
+        let at = |time_s: f64| {
+            let after = trajectory.time_s.partition_point(|&t| t < time_s - 1e-9);
+            trajectory.cost.get(after.min(trajectory.cost.len().checked_sub(1)?)).copied()
+        };
+        let steps = &self.performance.steps;
+        let end = steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
+        Some(at(end)? - at(steps.get(k)?.time_s)?)
+    }
+
+    /// Whether step `k` costs more than its bound, whose conditions are all met, by more than a controller that is sampled explains: the
+    /// bound is one of continuous time.
+    pub fn exceeds(&self, k: usize) -> bool {
+        let met = self.bounds.get(k).filter(|bound| bound.unmet.is_empty());
+        met.zip(self.cost_of_step(k)).is_some_and(|(bound, cost)| cost > bound.bound * (1.0 + SAMPLING))
+    }
+
+    /// A bound of the plant itself that this flight contradicts, in words.
+    pub fn contradiction(&self) -> Option<String> {
+        let k = (0..self.bounds.len()).find(|&k| self.bounds_are_of == Of::Plant && self.exceeds(k))?;
+        let (bound, cost) = (at_most(self.bounds[k].bound), about(self.cost_of_step(k)?));
+        Some(format!("the cost of step {} is bounded by {bound}, and the flight cost {cost}", k + 1))
+    }
+
     /// Sum of the steps' cost bounds, if every step starts inside the certified set.
     pub fn guaranteed_cost(&self) -> Option<f64> {
         (self.bounds.iter().all(StepBound::is_inside) && !self.bounds.is_empty())
@@ -80,7 +113,8 @@ fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design, proofs: Opti
     };
     let stays = step_stays(scenario, plan, design, proofs, &flight, &performance);
     claims.extend(stays.iter().map(|stay| stay.claim.clone()));
-    Flown { flight, performance, bounds, stays, claims, seconds }
+    let bounds_are_of = if scenario.is_linear() { Of::Plant } else { Of::Model };
+    Flown { flight, performance, bounds, bounds_are_of, stays, claims, seconds }
 }
 
 /// The bound of each step, with a claim that says which of its conditions are met.
@@ -92,20 +126,24 @@ fn step_bounds(
     trajectory: &Trajectory,
 ) -> (Vec<StepBound>, Vec<Claim>) {
     let scheduling = scenario.plant.description().scheduling.as_ref();
+    let states = &scenario.plant.description().states;
     let bound = |(k, step): (usize, &StepResponse)| {
+        // what is asked for from the step on
+        let reference = scenario.reference.at(step.time_s + 0.5 * scenario.sample_time_s);
         let conditions = StepConditions {
             error: &step.error,
+            reference: &reference,
             parameter: step.parameter,
             peak_parameter_rate: step.peak_parameter_rate,
             noise: plan.noise,
         };
-        let bound = step_bound(design, scheduling, &conditions);
+        let bound = step_bound(design, &*scenario.plant, &conditions);
         let inside = match bound.level {
             None => "inputs are not limited, so the certified set is everything".to_owned(),
-            Some(level) if bound.is_inside() => format!("inside the certified set of level {}", digits(level)),
+            Some(level) if bound.is_inside() => format!("inside the certified set of level {}", at_least(level)),
             Some(level) => {
                 let cover = cover(scenario, design, step, level);
-                format!("outside the certified set of level {}{cover}", digits(level))
+                format!("outside the certified set of level {}{cover}", at_least(level))
             }
         };
         let others = bound.unmet.iter().filter_map(|condition| match condition {
@@ -116,19 +154,33 @@ fn step_bounds(
                     None => "a parameter at rest".to_owned(),
                     Some(bounded) => format!("rates up to {} {unit}/s", bounded.rate),
                 };
-                Some(format!("; {parameter} moves at up to {rate:.2e} {unit}/s, and the bound is for {allowed}"))
+                Some(format!(
+                    "; {parameter} moves at up to {} {unit}/s, and the bound is for {allowed}",
+                    at_most(*rate)
+                ))
             }
             UnmetCondition::Noise => Some("; noise acts, of which the bound knows nothing".into()),
+            UnmetCondition::ReferenceMoves { state, rate } => {
+                let Signal { name, unit, .. } = &states[*state];
+                Some(format!("; the reference is not at rest: {name} moves at {} {unit}/s", about(*rate)))
+            }
+            UnmetCondition::ReferenceElsewhere => {
+                Some("; the reference rests where the plant is not the one of the model".into())
+            }
         });
         let end = performance.steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
         let beyond = excursions(scenario, design, trajectory, [step.time_s, end], bound.level);
         let kind = ClaimKind::StepCost { step: k + 1, time_s: step.time_s, bound: bound.bound };
+        let of = match scenario.is_linear() {
+            true => "",
+            false => "; a bound of the LPV model, which knows nothing of what linearisation leaves out",
+        };
         let claim = Claim::new(kind, Of::Model, &Words::default()).decided(
             bound.verdict(),
             bound.level.map_or(f64::INFINITY, |level| level - bound.bound),
-            inside + &others.collect::<String>() + &beyond,
+            inside + of + &others.collect::<String>() + &beyond,
         );
-        (bound, claim)
+        (bound, if scenario.is_linear() { claim.of_plant() } else { claim })
     };
     performance.steps.iter().enumerate().map(bound).unzip()
 }
@@ -152,9 +204,11 @@ fn excursions(
     let spell = |what: String, beyond: Option<Excursion>| match beyond {
         None => String::new(),
         Some(beyond) => {
-            format!("; {what} for {:.2} s between t = {:.2} s and {:.2} s", beyond.total_s, beyond.from_s, beyond.to_s)
+            let [total, from, to] = [beyond.total_s, beyond.from_s, beyond.to_s].map(about);
+            format!("; {what} for {total} s between t = {from} s and {to} s")
         }
     };
+    let lyapunov = LyapunovFunction::of(design, &*scenario.plant);
     let outside = level.and_then(|level| {
         excursion(&times, |at| {
             let (x, reference) = (&trajectory.states[within[at]], &trajectory.references[within[at]]);
@@ -162,7 +216,7 @@ fn excursions(
             description.state_error(x, reference, &mut error);
             let rho = scheduling.map_or(0.0, |scheduling| x[scheduling.state]);
             // rounding at the start of a step is no excursion
-            lyapunov_value(design, scheduling, rho, &error) > level * (1.0 + 1e-9)
+            lyapunov.value(rho, &error) > level * (1.0 + 1e-9)
         })
     });
     let mut text = spell("outside the set".into(), outside);
@@ -195,17 +249,20 @@ pub fn compare_with_proofs(scenario: &Scenario, flown: &mut Flown, proofs: &Proo
     let peak = flown.performance.steps.iter().map(|step| step.peak_parameter_rate).fold(0.0, f64::max);
     let kind = ClaimKind::RateKept { parameter: parameter.clone() };
     let (verdict, margin, detail) = match proofs.stable_up_to {
-        None => (Verdict::Undecided, f64::NAN, format!("none is proved; it moved at up to {peak:.4} {unit}/s")),
+        None => (Verdict::Undecided, f64::NAN, format!("none is proved; it moved at up to {} {unit}/s", at_most(peak))),
         Some(rate) => {
-            let proved = format!("proved for |d{parameter}/dt| <= {rate:.4} {unit}/s, flown up to {peak:.4} {unit}/s");
+            let [up_to, flown_at] = [at_least(rate), at_most(peak)];
+            let proved = format!("proved for |d{parameter}/dt| <= {up_to} {unit}/s, flown up to {flown_at} {unit}/s");
             match faster_than(scenario, trajectory, &all, rate) {
                 None => (Verdict::Numerical, rate - peak, proved),
                 Some(beyond) => (
                     Verdict::Undecided,
                     rate - peak,
                     format!(
-                        "{proved}: faster for {:.2} s between t = {:.2} s and {:.2} s, where nothing is proved",
-                        beyond.total_s, beyond.from_s, beyond.to_s
+                        "{proved}: faster for {} s between t = {} s and {} s, where nothing is proved",
+                        about(beyond.total_s),
+                        about(beyond.from_s),
+                        about(beyond.to_s)
                     ),
                 ),
             }
@@ -224,13 +281,8 @@ fn cover(scenario: &Scenario, design: &Design, step: &StepResponse, level: f64) 
     let from = design.method.gamma().unwrap_or(level);
     let model = linearize(&*scenario.plant, step.parameter);
     match covering_level(&model, &design.weights, &sigma, &step.error, from) {
-        Ok(Some(gamma)) => format!("; SLPVQR with γ = {} would cover it", digits(gamma)),
+        Ok(Some(gamma)) => format!("; SLPVQR with γ = {} would cover it", at_most(gamma)),
         Ok(None) => "; no γ up to 1e6 covers it".into(),
         Err(error) => format!("; which γ would cover it is not known: {error}"),
     }
-}
-
-/// Four decimals, or the exponent form where those would say nothing.
-fn digits(value: f64) -> String {
-    if value == 0.0 || (0.01..1e6).contains(&value.abs()) { format!("{value:.4}") } else { format!("{value:.3e}") }
 }

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::scenario::Scenario;
 use crate::stay::StepStay;
-use lpv::certificate::{Claim, StepBound, Verdict, worst};
+use lpv::certificate::{Claim, Of, StepBound, Verdict, worst};
 use lpv::estimator::Consistency;
 use lpv::sim::{Outcome, Performance};
 use lpv::synthesis::Method;
@@ -109,6 +109,8 @@ pub struct ControllerRecord<'a> {
     guaranteed_cost: Option<f64>,
     /// The verdict on that bound, for this flight.
     guaranteed_cost_verdict: Verdict,
+    /// Which system the bound is of: the LPV model, or the plant that flies.
+    guaranteed_cost_of: Of,
     flight_claims: &'a [Claim],
     /// The bound of each step, with the conditions that it does not meet.
     step_bounds: &'a [StepBound],
@@ -137,6 +139,7 @@ impl<'a> RunRecord<'a> {
                 design_claims: &checked.claims,
                 guaranteed_cost: flown.guaranteed_cost(),
                 guaranteed_cost_verdict: bound_verdict(checked, flown),
+                guaranteed_cost_of: flown.bounds_are_of,
                 flight_claims: &flown.claims,
                 step_bounds: &flown.bounds,
                 step_stays: &flown.stays,

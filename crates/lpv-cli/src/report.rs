@@ -9,7 +9,7 @@ use crate::stay::StepStay;
 use lpv::certificate::{Claim, ClaimKind, Member, Motion, Of, StepBound, Subject, UnmetCondition, Verdict};
 use lpv::math::decimal::{Rounding, at_most, decimal};
 use lpv::model::BoxWeights;
-use lpv::plant::{Description, PlantSpec, Scene};
+use lpv::plant::{Description, Scene};
 use lpv::sim::{Outcome, Trajectory};
 use lpv::synthesis::Method;
 use serde::Serialize;
@@ -83,6 +83,8 @@ struct RunData<'a> {
     guaranteed_cost: Option<f64>,
     guaranteed_cost_verdict: Verdict,
     guaranteed_cost_note: String,
+    /// Which system the bound is of: the LPV model, or the plant that flies.
+    guaranteed_cost_of: Of,
     actual_cost: Option<f64>,
     settling_time_s: Option<f64>,
     peak_input: f64,
@@ -166,7 +168,7 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
             states: &description.states,
             inputs: &description.inputs,
             outputs: &description.outputs,
-            linear: matches!(scenario.plant_spec, PlantSpec::Linear(_) | PlantSpec::DoubleIntegrator {}),
+            linear: scenario.is_linear(),
             scene: description.scene.as_ref(),
         },
         scheduling: SchedulingData {
@@ -234,6 +236,7 @@ fn run<'a>(
         guaranteed_cost: flown.guaranteed_cost(),
         guaranteed_cost_verdict: bound_verdict(checked, flown),
         guaranteed_cost_note: bound_note(flown),
+        guaranteed_cost_of: flown.bounds_are_of,
         actual_cost: flown.performance.actual_cost,
         settling_time_s: flown.performance.settling_time_s,
         peak_input: flown.performance.peak_input,
@@ -347,17 +350,23 @@ pub fn bound_note(flown: &Flown) -> String {
                 UnmetCondition::Outside { .. } => "outside",
                 UnmetCondition::ParameterMoves { .. } => "parameter moves",
                 UnmetCondition::Noise => "noise",
+                UnmetCondition::ReferenceMoves { .. } | UnmetCondition::ReferenceElsewhere => "reference not at rest",
             })
             .collect();
         unmet.join(", ")
     };
     match flown.bounds.as_slice() {
         [] => "no step".into(),
+        [one] if flown.exceeds(0) => {
+            [worth(one), "exceeded by the flight".to_owned()].join(", ").trim_start_matches(", ").into()
+        }
         [one] => worth(one),
         steps => {
+            let of = if flown.bounds_are_of == Of::Model { " of the model" } else { "" };
             let spell = |(k, bound): (usize, &StepBound)| match bound.verdict() {
                 Verdict::Numerical | Verdict::Proved => {
-                    format!("step {} ≤ {} {}", k + 1, at_most(bound.bound), bound.verdict().word())
+                    let beyond = if flown.exceeds(k) { ", exceeded by the flight" } else { "" };
+                    format!("step {} ≤ {}{of} {}{beyond}", k + 1, at_most(bound.bound), bound.verdict().word())
                 }
                 Verdict::Undecided | Verdict::Refuted => format!("step {} {}", k + 1, worth(bound)),
             };

@@ -63,7 +63,20 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             place.join("report.html").display()
         ))?;
     }
+    no_contradiction(&arguments.scenario, &scenario, &flown)?;
     required_verdicts(&scenario, &checked)
+}
+
+/// A bound on the plant that flies, all of whose conditions are met, holds for its flight; else the program is wrong.
+fn no_contradiction(file: &std::path::Path, scenario: &Scenario, flown: &[flights::Flown]) -> Result<(), Failure> {
+    let found = scenario.controllers.iter().zip(flown).find_map(|(plan, flown)| Some((plan, flown.contradiction()?)));
+    found.map_or(Ok(()), |(plan, words)| {
+        let (name, seed) = (&plan.request.name, scenario.seed);
+        Err(Failure::Defect(format!(
+            "\"{name}\": {words}; to replay (seed {seed}): lpv run {} --force",
+            file.display()
+        )))
+    })
 }
 
 /// The verdicts that the scenario requires; a refuted design is never what was asked for.

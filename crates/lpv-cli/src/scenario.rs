@@ -87,6 +87,11 @@ pub struct ControllerPlan {
 }
 
 impl Scenario {
+    /// Whether the LPV model leaves nothing of the plant out, so that its bounds are the plant's.
+    pub fn is_linear(&self) -> bool {
+        matches!(self.plant_spec, PlantSpec::Linear(_) | PlantSpec::DoubleIntegrator {})
+    }
+
     /// Read and check the scenario at `path`.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let text = read_text(path)?;

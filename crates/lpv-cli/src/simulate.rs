@@ -10,6 +10,7 @@ use crate::scenario::{Scenario, read_text};
 use clap::Args;
 use lpv::certificate::Claim;
 use lpv::estimator::Consistency;
+use lpv::math::decimal::fixed;
 use lpv::sim::{Outcome, Performance};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -83,7 +84,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         print(&json)?;
     } else {
         for (plan, flown) in scenario.controllers.iter().zip(&flown) {
-            let cost = flown.performance.actual_cost.map_or("-".into(), |cost| format!("{cost:.4}"));
+            let cost = flown.performance.actual_cost.map_or("-".into(), |cost| fixed(cost, 4));
             let settling = flown.performance.settling_time_s.map_or("-".into(), |time| format!("{time:.2} s"));
             let ending = match flown.flight.outcome {
                 Outcome::Completed => "completed".into(),

@@ -5,6 +5,8 @@ use crate::flights::Flown;
 use crate::record::bound_verdict;
 use crate::report::bound_note;
 use crate::scenario::Scenario;
+use lpv::certificate::Of;
+use lpv::math::decimal::{at_most, fixed};
 use lpv::sim::Outcome;
 
 const HEADER: [&str; 8] =
@@ -17,13 +19,13 @@ pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flo
     let mut rows = vec![HEADER.map(str::to_owned).to_vec()];
     for ((plan, checked), flown) in scenario.controllers.iter().zip(designs).zip(flights) {
         let performance = &flown.performance;
-        let number =
-            |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+        let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| fixed(value, digits));
         let note = bound_note(flown);
         let verdict = bound_verdict(checked, flown).word();
+        let of = if flown.bounds_are_of == Of::Model { " of the model" } else { "" };
         let bound = match (flown.guaranteed_cost(), note.is_empty()) {
-            (Some(bound), true) => format!("{bound:.4} ({verdict})"),
-            (Some(bound), false) => format!("{bound:.4} ({verdict}: {note})"),
+            (Some(bound), true) => format!("{}{of} ({verdict})", at_most(bound)),
+            (Some(bound), false) => format!("{}{of} ({verdict}: {note})", at_most(bound)),
             (None, _) => note,
         };
         rows.push(vec![
@@ -32,8 +34,8 @@ pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flo
             bound,
             number(performance.actual_cost, 4),
             performance.settling_time_s.map_or("-".into(), |time| format!("{time:.2} s")),
-            format!("{:.2} {unit}", performance.peak_input),
-            format!("{:.1} %", 100.0 * performance.saturated_share),
+            format!("{} {unit}", fixed(performance.peak_input, 2)),
+            format!("{} %", fixed(100.0 * performance.saturated_share, 1)),
             match flown.flight.outcome {
                 Outcome::Completed => "completed".to_owned(),
                 Outcome::EstimatorDiverged { time_s } => format!("DIVERGED at {time_s:.2} s (estimate)"),

@@ -8,6 +8,7 @@ mod claim;
 mod inequality;
 mod proof;
 mod region;
+mod rest;
 mod stability;
 mod supervised;
 
@@ -18,8 +19,9 @@ pub use proof::{
     lyapunov_matrix, prove, prove_gain, prove_polytopic,
 };
 pub use region::{
-    Excursion, StepBound, StepConditions, UnmetCondition, excursion, lyapunov_value, step_bound, unsaturated_level,
+    Excursion, LyapunovFunction, StepBound, StepConditions, UnmetCondition, excursion, step_bound, unsaturated_level,
 };
+pub use rest::{Unrest, unrest};
 pub use stability::{StabilityMargin, frozen_stability};
 pub use supervised::{SupervisedProofs, prove_supervised};
 

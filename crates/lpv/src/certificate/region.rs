@@ -1,22 +1,28 @@
 //! What a design's bound is worth for one step of a flight.
 
 use super::Verdict;
+use super::proof::lyapunov_form;
+use super::rest::{Unrest, unrest};
 use crate::controller::cubic_weights;
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, quadratic_form};
-use crate::plant::Scheduling;
+use crate::plant::Plant;
 use crate::synthesis::Design;
 use serde::Serialize;
 
 /// A parameter rate up to this, per second, is rest: what the solver's accuracy, a relative 1e-6 in the gains, leaves of a
 /// heading that nothing turns.
 const REST_RATE: f64 = 1e-5;
+/// More than rounding takes from a sum of a few hundred products.
+const ROUNDING: f64 = 1e-12;
 
 /// How a step was flown, as far as the bound asks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepConditions<'a> {
     /// x − x_ref at its start.
     pub error: &'a [f64],
+    /// x_ref
+    pub reference: &'a [f64],
     /// Scheduling parameter at its start.
     pub parameter: f64,
     /// Largest rate of the parameter during the step, per second.
@@ -41,12 +47,22 @@ pub enum UnmetCondition {
     },
     /// Noise acts, of which the bound knows nothing.
     Noise,
+    /// The reference is no point of rest: its state of this index moves.
+    ReferenceMoves {
+        /// Index of the state.
+        state: usize,
+        /// At this rate, per second.
+        rate: f64,
+    },
+    /// The reference rests where the plant is another than the model.
+    ReferenceElsewhere,
 }
 
 /// The cost bound of a step, and what it is worth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StepBound {
-    /// eᵀP(ρ)e: the bound on the cost of the step, if every condition is met.
+    /// eᵀP(ρ)e, rounded up: the bound on the cost of the step, if every condition is met. Of the LPV model with a controller in continuous
+    /// time; of the plant where that is linear.
     pub bound: f64,
     /// Level of the certified set; `None` where inputs are not limited and the set is everything.
     pub level: Option<f64>,
@@ -55,9 +71,13 @@ pub struct StepBound {
 }
 
 impl StepBound {
-    /// Whether the step starts inside the certified set.
+    /// Whether the step starts inside the certified set, to a reference at rest: without that there is no bound.
     pub fn is_inside(&self) -> bool {
-        !self.unmet.iter().any(|condition| matches!(condition, UnmetCondition::Outside { .. }))
+        let takes_it_away = |condition: &UnmetCondition| {
+            use UnmetCondition::{Outside, ReferenceElsewhere, ReferenceMoves};
+            matches!(condition, Outside { .. } | ReferenceMoves { .. } | ReferenceElsewhere)
+        };
+        !self.unmet.iter().any(takes_it_away)
     }
 
     /// `numerical` if every condition is met, else `undecided`: a bound out of its conditions says nothing.
@@ -66,12 +86,13 @@ impl StepBound {
     }
 }
 
-/// The bound of a step flown with `design`; `scheduling` is the plant's.
+/// The bound of a step flown with `design` on the plant that it names.
 ///
-/// The level is γ for the saturated methods; for LPVQR with limited inputs it is [`unsaturated_level`]. Between grid
-/// points P is interpolated as a [`crate::controller::Schedule::Grid`] is.
-pub fn step_bound(design: &Design, scheduling: Option<&Scheduling>, step: &StepConditions) -> StepBound {
-    let p = lyapunov_matrix(design, scheduling, step.parameter);
+/// The level is γ for the saturated methods; for LPVQR with limited inputs it is [`unsaturated_level`], rounded down. V is the one that is
+/// proved, see [`LyapunovFunction`].
+pub fn step_bound(design: &Design, plant: &dyn Plant, step: &StepConditions) -> StepBound {
+    let lyapunov = LyapunovFunction::of(design, plant);
+    let p = lyapunov.matrix(step.parameter);
     let level = design.method.gamma().or_else(|| {
         let sigma = design.controller.limits.room(&design.controller.operating_input);
         sigma.iter().any(|sigma| sigma.is_finite()).then_some(())?;
@@ -79,17 +100,27 @@ pub fn step_bound(design: &Design, scheduling: Option<&Scheduling>, step: &StepC
         let at_rest = unsaturated_level(&p, &schedule.gain_matrix(step.parameter), &sigma);
         // where the parameter may move the state has to stay inside at every value of it
         let moving = design.points.iter().filter(|_| design.rate_bounded.is_some());
-        Some(moving.fold(at_rest, |level, point| {
+        let level = moving.fold(at_rest, |level, point| {
             level.min(unsaturated_level(&point.p, &schedule.gain_matrix(point.rho), &sigma))
-        }))
+        });
+        Some(level * (1.0 - ROUNDING))
     });
-    let bound = quadratic_form(&p, step.error);
+    let sizes: Vec<f64> = step.error.iter().map(|e| e.abs()).collect();
+    let bound = quadratic_form(&p, step.error) + ROUNDING * quadratic_form(&absolute(&p), &sizes);
     let outside = level.filter(|&level| bound.is_nan() || bound > level).map(|level| UnmetCondition::Outside { level });
     let rate = step.peak_parameter_rate;
     let allowed = design.rate_bounded.as_ref().map_or(REST_RATE, |bounded| bounded.rate);
     let moves = (rate.is_nan() || rate > allowed).then_some(UnmetCondition::ParameterMoves { rate });
     let noise = step.noise.then_some(UnmetCondition::Noise);
-    StepBound { bound, level, unmet: [outside, moves, noise].into_iter().flatten().collect() }
+    let reference = unrest(plant, step.reference, &design.controller.operating_input).map(|unrest| match unrest {
+        Unrest::Moves { state, rate } => UnmetCondition::ReferenceMoves { state, rate },
+        Unrest::Elsewhere => UnmetCondition::ReferenceElsewhere,
+    });
+    StepBound { bound, level, unmet: [reference, outside, moves, noise].into_iter().flatten().collect() }
+}
+
+fn absolute(matrix: &Mat<f64>) -> Mat<f64> {
+    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)].abs())
 }
 
 /// When a flight was beyond what a bound is for.
@@ -115,9 +146,40 @@ pub fn excursion(times: &[f64], is_beyond: impl Fn(usize) -> bool) -> Option<Exc
     found
 }
 
-/// V = eᵀP(ρ)e for the error e, with P between the grid points as in [`step_bound`].
-pub fn lyapunov_value(design: &Design, scheduling: Option<&Scheduling>, rho: f64, error: &[f64]) -> f64 {
-    quadratic_form(&lyapunov_matrix(design, scheduling, rho), error)
+/// P(ρ) of a design as its proofs take it; of a frozen design whose P cannot be joined by harmonics (its parameter is not periodic), and of
+/// which nothing is proved between the grid points, interpolated as a [`crate::controller::Schedule::Grid`] is.
+pub struct LyapunovFunction<'a> {
+    design: &'a Design,
+    form: Option<super::proof::Form>,
+    period: Option<f64>,
+}
+
+impl<'a> LyapunovFunction<'a> {
+    /// Of a design for the plant that it names.
+    pub fn of(design: &'a Design, plant: &dyn Plant) -> Self {
+        let scheduling = plant.description().scheduling.as_ref();
+        let period = scheduling.filter(|s| s.periodic).map(|s| s.range[1] - s.range[0]);
+        Self { design, form: lyapunov_form(design, plant), period }
+    }
+
+    /// P(ρ)
+    pub fn matrix(&self, rho: f64) -> Mat<f64> {
+        if let Some(p) = self.form.as_ref().and_then(|form| form.p(rho)) {
+            return p;
+        }
+        let points = &self.design.points;
+        let parameters: Vec<f64> = points.iter().map(|point| point.rho).collect();
+        let n = points[0].p.nrows();
+        cubic_weights(&parameters, self.period, rho).fold(Mat::zeros(n, n), |sum, (k, weight)| {
+            let p = &points[k].p;
+            Mat::from_fn(n, n, |i, j| sum[(i, j)] + weight * p[(i, j)])
+        })
+    }
+
+    /// V = eᵀP(ρ)e
+    pub fn value(&self, rho: f64, error: &[f64]) -> f64 {
+        quadratic_form(&self.matrix(rho), error)
+    }
 }
 
 /// The largest γ such that u = −Kx does not saturate, |kᵢx| ≤ σᵢ, on xᵀPx ≤ γ: min σᵢ²/(kᵢP⁻¹kᵢᵀ) (Lemma 2.2).
@@ -132,20 +194,6 @@ pub fn unsaturated_level(p: &Mat<f64>, k: &Mat<f64>, sigma: &[f64]) -> f64 {
         if size == 0.0 { f64::INFINITY } else { (sigma[i] / size).powi(2) }
     };
     (0..k.nrows()).map(level).fold(f64::INFINITY, f64::min)
-}
-
-/// P(ρ): of a frozen design interpolated, of a rate-bounded one its inverse.
-fn lyapunov_matrix(design: &Design, scheduling: Option<&Scheduling>, rho: f64) -> Mat<f64> {
-    if let Some(p) = design.rate_bounded.as_ref().and_then(|bounded| bounded.p(rho)) {
-        return p;
-    }
-    let parameters: Vec<f64> = design.points.iter().map(|point| point.rho).collect();
-    let period = scheduling.filter(|s| s.periodic).map(|s| s.range[1] - s.range[0]);
-    let n = design.points[0].p.nrows();
-    cubic_weights(&parameters, period, rho).fold(Mat::zeros(n, n), |sum, (k, weight)| {
-        let p = &design.points[k].p;
-        Mat::from_fn(n, n, |i, j| sum[(i, j)] + weight * p[(i, j)])
-    })
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ const LEVEL_SAMPLES_PER_PIECE: usize = 4;
 
 /// V(x, ρ) in one of its two forms.
 #[derive(Clone, Debug)]
-pub(super) enum Form {
+pub(in super::super) enum Form {
     /// xᵀP(ρ)x
     Direct(MatrixFunction),
     /// xᵀY(ρ)⁻¹x

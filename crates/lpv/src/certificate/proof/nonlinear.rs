@@ -110,7 +110,9 @@ pub(super) fn prove(
     if !closed_loop.rests_at_every_parameter() {
         return undecided("the operating point moves with the parameter, or is not at rest");
     }
-    let Some(mixtures) = closed_loop.mixtures() else { return undecided("too many inputs saturate to try all of their mixtures") };
+    let Some(mixtures) = closed_loop.mixtures() else {
+        return undecided("too many inputs saturate to try all of their mixtures");
+    };
     let Some(unit) = closed_loop.unit_bounds() else { return undecided("the box around the set could not be proved") };
     let decreases = |level: f64, what: Decreases, least: f64| {
         let Some(remainder) = closed_loop.remainder(&unit.times(level.sqrt())) else {

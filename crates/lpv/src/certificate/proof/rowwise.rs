@@ -124,9 +124,8 @@ impl Rows {
     /// αᵢ of each row, chosen by the middles of the entries; zero of one that takes nothing.
     pub fn balance(&self, inverse: &Mat<f64>) -> Vec<f64> {
         let (rows, n) = self.d.shape();
-        let middle = |matrix: &TaylorMatrix, i: usize| -> Vec<f64> {
-            (0..n).map(|j| matrix.at(i, j).value.middle()).collect()
-        };
+        let middle =
+            |matrix: &TaylorMatrix, i: usize| -> Vec<f64> { (0..n).map(|j| matrix.at(i, j).value.middle()).collect() };
         (0..rows).map(|i| balance(&middle(&self.d, i), &middle(&self.g, i), inverse).unwrap_or(0.0)).collect()
     }
 
