@@ -27,6 +27,8 @@ const RUN_STYLES: readonly RunStyle[] = [
   { light: "#3c4a5c", dark: "#c3cedd", dash: [4, 2], marker: "ring" },
   { light: "#5a30b8", dark: "#9573ff", dash: [12, 3, 2, 3, 2, 3], marker: "down" },
   { light: "#2d9fd0", dark: "#a4e0ff", dash: [6, 6], marker: "cross" },
+  { light: "#7d4e2d", dark: "#d2a679", dash: [5, 2, 1, 2], marker: "circle" },
+  { light: "#5f6d00", dark: "#c5d65b", dash: [14, 3, 5, 3], marker: "square" },
 ];
 
 /** Colours that canvases need; the page's own are in style.css. */

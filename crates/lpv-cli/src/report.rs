@@ -153,8 +153,8 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
             ..run(description, &shown, weights.as_ref(), k, plan, checked, flown)
         })
         .collect();
-    // what is proved throughout leads, and letters follow; colours stay those of the scenario's order
-    runs.sort_by_key(|run| !is_proved_throughout(&run.claims));
+    // what is proved leads: flight and all, then the design alone. Letters follow; colours stay those of the scenario
+    runs.sort_by_key(|run| (!is_proved_throughout(&run.claims), run.verdict < Verdict::Proved));
     Report {
         schema: "lpv-report/1",
         title: &scenario.title,
@@ -281,8 +281,8 @@ fn certify_command(folder: &Path, controller: &str) -> String {
     }
 }
 
-/// The largest rate of the parameter for which every set of the design is proved invariant (or V to decrease) and the cost
-/// bound from it is proved; 0 is at rest. `None` where one of these is not proved, or there is no parameter.
+/// The largest rate of the parameter for which every set of the design is proved invariant (or V to decrease) and the
+/// cost bound from it is proved; 0 is at rest. `None` where one of these is not proved, or there is no parameter.
 fn proved_rate(checked: &CheckedDesign) -> Option<f64> {
     let mut members = std::iter::once(Member::Outer).chain((0..checked.design.inner.len()).map(Member::Inner));
     let least = members.try_fold(f64::INFINITY, |least, member| Some(least.min(member_rate(&checked.claims, member)?)));
@@ -315,7 +315,8 @@ fn member_rate(claims: &[Claim], member: Member) -> Option<f64> {
     proved().filter_map(costs).flat_map(of_set).reduce(f64::max)
 }
 
-/// Whether every claim is proved, of the design and of each step. That a flight kept to its rate is looked up, never proved.
+/// Whether every claim is proved, of the design and of each step. That a flight kept to its rate is looked up, never
+/// proved.
 fn is_proved_throughout(claims: &[&Claim]) -> bool {
     let mut proofs = claims.iter().filter(|claim| !matches!(claim.kind, ClaimKind::RateKept { .. })).peekable();
     proofs.peek().is_some() && proofs.all(|claim| claim.verdict == Verdict::Proved)
