@@ -156,7 +156,8 @@ fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesig
         bar.set_message(format!("prove {}", request.name));
         match prove_supervised(&design, &*scenario.plant, &ProofOptions::default()) {
             Ok(found) => {
-                claims = merged(claims, found.claims.clone());
+                let counted = found.claims.iter().filter(|claim| found.members[0].is_counted(claim));
+                claims = merged(claims, counted.cloned().collect());
                 proofs = Some(found);
             }
             Err(reason) => {
