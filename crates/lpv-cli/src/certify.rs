@@ -8,7 +8,7 @@ use crate::output::print;
 use crate::scenario::door::Door;
 use crate::scenario::read_text;
 use clap::Args;
-use lpv::certificate::{Claim, ProofOptions, Verdict, Witness, check, prove_supervised};
+use lpv::certificate::{Claim, ProofOptions, Record, RecordError, Verdict, Witness, check, prove_supervised};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -30,6 +30,9 @@ pub struct CertifyArguments {
     /// Print the claims as JSON instead of text
     #[arg(long)]
     json: bool,
+    /// Write what is proved, with all that another program needs to check it (docs/proved.md), to FILE
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
 }
 
 /// What `--json` prints.
@@ -83,7 +86,9 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
                 );
             }
         }
-        let claims = polytopic::claims(&door, &text, arguments.region)?;
+        let mut record = Record::default();
+        let claims = polytopic::claims(&door, &text, arguments.region, &mut record)?;
+        write(arguments, &record)?;
         let name = arguments.design.file_stem().map_or("design".into(), |name| name.to_string_lossy().into_owned());
         return finish(arguments, &name, designs::worst(&claims), &claims);
     }
@@ -100,6 +105,11 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     let options = ProofOptions { rate: arguments.rate, level: arguments.region, nonlinear: arguments.nonlinear };
     match prove_supervised(&design, &*plant, &options) {
         Ok(proofs) => {
+            if arguments.record.is_some() {
+                let mut record = Record::default();
+                record.add_design(&design, &*plant, &proofs).map_err(|error| unwritten(arguments, &error))?;
+                write(arguments, &record)?;
+            }
             // the rates found for a frozen design are a finding, not a claim that it makes
             let asked = proofs.members[0].asked;
             let counted = |claim: &&Claim| asked || claim.verdict == Verdict::Refuted;
@@ -113,6 +123,19 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
         Err(reason) => claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string())),
     }
     finish(arguments, &design.name, verdict, &claims)
+}
+
+/// Write the record where it is asked for; one that would be empty is an error.
+fn write(arguments: &CertifyArguments, record: &Record) -> Result<(), Failure> {
+    let Some(file) = &arguments.record else { return Ok(()) };
+    if record.is_empty() {
+        return Err(Failure::NotCertified("nothing is proved that could be recorded".into()));
+    }
+    std::fs::write(file, record.text()).map_err(|error| Failure::io(file, &error))
+}
+
+fn unwritten(arguments: &CertifyArguments, error: &RecordError) -> Failure {
+    Failure::Unreadable { file: arguments.design.clone(), message: error.to_string() }
 }
 
 /// Print the claims; exit as the verdict asks.

@@ -12,8 +12,8 @@ mod supervised;
 
 pub use inequality::{BlockMargin, block_margins};
 pub use proof::{
-    COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Unprovable,
-    lyapunov_matrix, prove, prove_gain, prove_polytopic,
+    COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Record,
+    RecordError, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic,
 };
 pub use region::{
     Excursion, StepBound, StepConditions, UnmetCondition, excursion, lyapunov_value, step_bound, unsaturated_level,

@@ -17,6 +17,7 @@ mod matrix;
 mod motion;
 mod nonlinear;
 mod polytopic;
+mod record;
 mod sampled;
 
 pub use closed_loop::Unprovable;
@@ -25,6 +26,7 @@ pub use motion::MotionProof;
 pub(super) use motion::prove_motion;
 pub use nonlinear::NonlinearProof;
 pub use polytopic::{PolytopicClaim, PolytopicLyapunov, prove_polytopic};
+pub use record::{Record, RecordError};
 
 use super::{Claim, Verdict, Witness};
 use crate::math::interval::Interval;
