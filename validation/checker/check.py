@@ -2,18 +2,17 @@
 """Checks a proof record of lpv without lpv: `check.py RECORD [--design DESIGN.json] [--jobs N]`.
 
 Everything is derived again from the numbers of the record: the plant's linearisation, the closed loop, the matrices that have to be
-definite. Real numbers are balls of Arb (python-flint), whose radii hold every rounding. Nothing of lpv is imported, and its method is
-not the one used here:
+definite. Real numbers are balls of Arb (python-flint), whose radii hold every rounding. The method is not that of lpv:
 
 * Every matrix of a theorem is, on a piece of the parameter's range, a sum of constant matrices times t^j cos kρ and t^j sin kρ
-  (`Sum`), ρ = low + ω (piece + t): gains are cubic splines in t, plant and Lyapunov matrix are trigonometric polynomials in ρ. Such
-  sums are added, multiplied and differentiated as they are.
-* On a cell [a, b], entry by entry, M(t) = chord of M(a), M(b) + e with e in [-(b - a)²/8, 0]·M''(cell) (interpolation error). If
-  M(a) + e and M(b) + e are positive definite for every such e, so is every M(t), their convex combination.
-* A symmetric ball matrix N is positive definite if T N Tᵀ is in Gershgorin's discs within 1 of I; T is any matrix, here of a
-  Cholesky factorisation in floating point.
+  (`Sum`), ρ = low + ω (piece + t): gains are cubic splines in t, plant and Lyapunov matrix trigonometric polynomials in ρ. Such sums
+  are added, multiplied and differentiated as they are.
+* On a cell [a, b], entry by entry, M(t) = chord of M(a), M(b) + e with e in [-(b - a)²/8, 0]·M''(cell) (error of interpolation). If
+  M(a) + e and M(b) + e are positive definite for all such e, so is every M(t), a convex combination of the two.
+* A symmetric ball matrix N is positive definite if in TNTᵀ - I every row sums to less than 1 (Gershgorin); T is any matrix, here the
+  inverse of a Cholesky factor in floating point.
 
-A cell that is too wide for that is halved; a cell that is missing is refused. Exit status 0 and `accepted` only if every claim holds.
+A cell that is too wide for that is halved; one that is missing is refused. The last line says `accepted` only if every claim holds.
 """
 import argparse
 import hashlib
@@ -22,13 +21,16 @@ import json
 import math
 import multiprocessing
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from fractions import Fraction
-from operator import mul
+from functools import reduce
+from operator import add, mul
 
 from flint import arb, arb_mat, ctx
 
 ctx.prec = 64  # bits
 HALVINGS = 8  # of a cell
+SERIES = 24  # terms of the exponential series
 # A quotient of parameters is meant exactly or as the double nearest to it: both are in this ball around it.
 ROUNDED = arb(1, 2.0**-50)
 FORMAT = "lpv proof record 1"
@@ -42,17 +44,17 @@ def require(condition, why):
     if not condition:
         raise Refused(why)
 
-
 # ---------------------------------------------------------------------------------------------------------------- the file
 
+def load(text):
+    """A line of JSON, in which no key stands twice and numbers are integers or hexadecimal floating point."""
+    def no_twins(pairs):
+        require(len({key for key, _ in pairs}) == len(pairs), "a key stands twice")
+        return dict(pairs)
 
-def no_twins(pairs):
-    require(len({key for key, _ in pairs}) == len(pairs), "a key stands twice")
-    return dict(pairs)
-
-
-def no_decimals(text):
-    raise Refused(f"{text} is no exact number")
+    def no_decimals(number):
+        raise Refused(f"{number} is no exact number")
+    return exact(json.loads(text, object_pairs_hook=no_twins, parse_float=no_decimals, parse_constant=no_decimals))
 
 
 def exact(value):
@@ -70,12 +72,10 @@ def read(path):
     """Designs and claims of a record."""
     with open(path, "rb") as file:
         head, _, body = file.read().partition(b"\n")
-    load = lambda text: json.loads(text, object_pairs_hook=no_twins, parse_float=no_decimals, parse_constant=no_decimals)
-    head, lines = load(head), [exact(load(line)) for line in body.splitlines()]
+    head, lines = load(head), [load(line) for line in body.splitlines()]
     require(head["format"] == FORMAT and head["lines"] == len(lines), "lines are missing, or of another format")
     require(hashlib.sha256(body).hexdigest() == head["sha256"], "the digest is not that of the record")
-    designs = [line for line in lines if "claim" not in line]
-    claims = [line for line in lines if "claim" in line]
+    designs, claims = ([line for line in lines if ("claim" in line) == is_claim] for is_claim in (False, True))
     require(lines == designs + claims and claims, "designs come first, then claims")
     for number, line in enumerate(designs):
         require(line.get("design", line.get("polytope")) == number, "designs are not numbered in turn")
@@ -91,7 +91,7 @@ def symmetric(rows, size, what):
 
 
 def semidefinite(rows, strictly):
-    """M ⪰ 0 (or ≻ 0), in rational numbers: every pivot of a symmetric elimination is, a zero one with zeros beside it."""
+    """M ⪰ 0 (or ≻ 0), in rational numbers: no pivot of a symmetric elimination is negative, and beside a zero one stand zeros."""
     m = [[Fraction(x) for x in row] for row in rows]
     for k in range(len(m)):
         if m[k][k] < 0 or (m[k][k] == 0 and (strictly or any(m[k][k + 1 :]))):
@@ -102,27 +102,45 @@ def semidefinite(rows, strictly):
     return True
 
 
+def check_weights(weights, n, m):
+    symmetric(weights["q"], n, "Q"), symmetric(weights["r"], m, "R")
+    require(semidefinite(weights["q"], False) and semidefinite(weights["r"], True), "Q is not ⪰ 0, or R not ≻ 0")
+    return weights["q"], weights["r"]
+
 # ------------------------------------------------------------------------------------------ matrices as functions on a piece
+
+def ball(fraction):
+    return arb(fraction.numerator) / arb(fraction.denominator)
+
+
+def unit(n, factor=1.0):
+    return Sum.constant([[factor if i == j else 0.0 for j in range(n)] for i in range(n)])
 
 
 class Sum:
-    """Σ C t^j cos kρ (s = 0) or t^j sin kρ (s = 1): terms[j, k, s] = C, all of one shape."""
+    """Σ C t^j cos kρ (s = 0) or t^j sin kρ (s = 1): terms[j, k, s] = C, all of one shape; what is exactly zero is left out."""
 
     def __init__(self, shape, terms):
-        self.shape = shape
-        vanishes = lambda key, c: key[1:] == (0, 1) or all(x.is_zero() for x in c.entries())
-        self.terms = {key: c for key, c in terms.items() if not vanishes(key, c)}
+        self.shape, self.terms = shape, {}
+        for (j, k, s), c in terms.items():
+            require((c.nrows(), c.ncols()) == shape, "matrices differ in size")
+            if (k, s) != (0, 1) and not all(x.is_zero() for x in c.entries()):
+                self.terms[j, k, s] = c
 
     @staticmethod
     def constant(rows):
         return Sum((len(rows), len(rows[0])), {(0, 0, 0): arb_mat(rows)})
 
+    @staticmethod
+    def of_terms(shape, pairs):
+        terms = {}
+        for key, c in pairs:
+            terms[key] = terms[key] + c if key in terms else c
+        return Sum(shape, terms)
+
     def __add__(self, other):
         require(self.shape == other.shape, "matrices differ in size")
-        terms = dict(self.terms)
-        for key, c in other.terms.items():
-            terms[key] = terms[key] + c if key in terms else c
-        return Sum(self.shape, terms)
+        return Sum.of_terms(self.shape, [*self.terms.items(), *other.terms.items()])
 
     def times(self, factor):
         return Sum(self.shape, {key: c * arb(factor) for key, c in self.terms.items()})
@@ -132,76 +150,65 @@ class Sum:
 
     def __matmul__(self, other):
         require(self.shape[1] == other.shape[0], "matrices differ in size")
-        terms = {}
-        for (i, k, s), left in self.terms.items():
-            for (j, l, r), right in other.terms.items():
-                # cos cos, sin sin, sin cos and cos sin of k and l, of k + l and k - l
-                product, wave = left * right * arb(0.5), s ^ r
-                for harmonic, sign in (k + l, -1 if s and r else 1), (k - l, -1 if r and not s else 1):
-                    if wave and harmonic < 0:
-                        sign = -sign
-                    key = (i + j, abs(harmonic), wave)
-                    piece = product * arb(sign)
-                    terms[key] = terms[key] + piece if key in terms else piece
-        return Sum((self.shape[0], other.shape[1]), terms)
+        pairs = []
+        for ((i, k, s), left), ((j, l, r), right) in itertools.product(self.terms.items(), other.terms.items()):
+            # cos cos, sin sin, sin cos and cos sin of k and l, by waves of k + l and k - l
+            product, wave = left * right * arb(0.5), s ^ r
+            for harmonic, sign in (k + l, -1 if s and r else 1), (k - l, -1 if r and not s else 1):
+                sign = -sign if wave and harmonic < 0 else sign
+                pairs.append(((i + j, abs(harmonic), wave), product * arb(sign)))
+        return Sum.of_terms((self.shape[0], other.shape[1]), pairs)
 
     @property
     def t(self):
         return Sum(self.shape[::-1], {key: c.transpose() for key, c in self.terms.items()})
 
+    def waves(self):
+        """Terms of one without t, by (k, s)."""
+        require(all(j == 0 for j, _, _ in self.terms), "it depends on more than ρ")
+        return {(k, s): c for (_, k, s), c in self.terms.items()}
+
     def by_rho(self):
-        """∂/∂ρ of one without t."""
-        require(all(j == 0 for j, _, _ in self.terms), "only functions of ρ are differentiated")
-        slope = lambda k, s: (arb(k), 0) if s else (arb(-k), 1)
-        return Sum(self.shape, {(0, k, slope(k, s)[1]): c * slope(k, s)[0] for (_, k, s), c in self.terms.items()})
+        """∂/∂ρ."""
+        return Sum(self.shape, {(0, k, 1 - s): c * arb(k if s else -k) for (k, s), c in self.waves().items()})
 
     def rows(self, picked):
-        pick = lambda c: arb_mat([[c[i, j] for j in range(self.shape[1])] for i in picked])
+        pick = lambda c: arb_mat([c.tolist()[i] for i in picked])
         return Sum((len(picked), self.shape[1]), {key: pick(c) for key, c in self.terms.items()})
 
     def at(self, rho):
-        """The value of one without t."""
-        value = arb_mat(*self.shape)
-        for (_, k, s), c in self.terms.items():
-            value += c * (rho * k).sin_cos()[1 - s]
-        return value
+        values = (c * (rho * k).sin_cos()[1 - s] for (k, s), c in self.waves().items())
+        return sum(values, arb_mat(*self.shape))
 
     def bound(self, i, j):
-        """A bound on |entry| for all ρ: |c₀| + Σ √(cₖ² + sₖ²)."""
-        waves = {k: [arb(0), arb(0)] for _, k, _ in self.terms}
-        for (power, k, s), c in self.terms.items():
-            require(power == 0, "only functions of ρ are bounded")
-            waves[k][s] = c[i, j]
-        return sum(((c.abs_upper() ** 2 + s.abs_upper() ** 2).sqrt().abs_upper() for c, s in waves.values()), arb(0))
+        """A bound on |entry| for all ρ: Σₖ √(cₖ² + sₖ²)."""
+        size = lambda k, s: self.terms[0, k, s][i, j].abs_upper() if (0, k, s) in self.terms else arb(0)
+        harmonics = {k for k, _ in self.waves()}
+        return sum(((size(k, 0) ** 2 + size(k, 1) ** 2).sqrt().abs_upper() for k in harmonics), arb(0)).abs_upper()
 
 
 def function(value, shape):
     """Σ fᵢ(ρ) Mᵢ as the record writes it."""
-    total = Sum(shape, {})
-    require(len(value["basis"]) == len(value["coefficients"]) > 0, "a function has too few coefficients")
-    for basis, rows in zip(value["basis"], value["coefficients"]):
+    pairs = []
+    for basis, rows in zip(value["basis"], value["coefficients"], strict=True):
         require(basis["function"] in ("constant", "cos", "sin"), "only constants and harmonics are known")
-        require((len(rows), len(rows[0])) == shape, "a coefficient is of another size")
-        total += Sum(shape, {(0, basis.get("harmonic", 0), int(basis["function"] == "sin")): arb_mat(rows)})
-    return total
+        require(basis.get("parameter", 0) == 0 and basis.get("harmonic", 0) >= 0, "a harmonic is odd")
+        pairs.append(((0, basis.get("harmonic", 0), int(basis["function"] == "sin")), arb_mat(rows)))
+    return Sum.of_terms(shape, pairs)
 
 
 def blocks(grid):
     """[[M₁₁, M₁₂, …], …] as one."""
-    offsets = lambda sizes: list(itertools.accumulate(sizes, initial=0))
-    down, across = offsets(row[0].shape[0] for row in grid), offsets(block.shape[1] for block in grid[0])
-    shape, terms = (down[-1], across[-1]), {}
-    for top, row in zip(down, grid):
-        for left, block in zip(across, row):
-            for key, c in block.terms.items():
-                whole = terms.setdefault(key, arb_mat(*shape))
-                for i, j in itertools.product(range(block.shape[0]), range(block.shape[1])):
-                    whole[top + i, left + j] = c[i, j]
-    return Sum(shape, terms)
-
+    down, across = [row[0].shape[0] for row in grid], [block.shape[1] for block in grid[0]]
+    zero = lambda i, j: [[arb(0)] * across[j]] * down[i]
+    terms = {}
+    for key in set().union(*(block.terms for row in grid for block in row)):
+        part = lambda i, j: grid[i][j].terms[key].tolist() if key in grid[i][j].terms else zero(i, j)
+        bands = ([part(i, j) for j in range(len(across))] for i in range(len(down)))
+        terms[key] = arb_mat([sum(rows, []) for band in bands for rows in zip(*band)])
+    return Sum((sum(down), sum(across)), terms)
 
 # ------------------------------------------------------------------------------------------------------- positive definite
-
 
 def inverse_factor(m, n):
     """L⁻¹ of M ≈ LLᵀ in floating point, as rows; None if there is none."""
@@ -213,108 +220,77 @@ def inverse_factor(m, n):
         pivot = m[i * n + i] - sum(map(mul, row, row))
         if not 0.0 < pivot < math.inf:
             return None
-        pivot = math.sqrt(pivot)
-        sums = [0.0] * n
+        pivot, sums = math.sqrt(pivot), [0.0] * i + [1.0] + [0.0] * (n - i - 1)
         for x, known in zip(row, inverse):
             sums = [s - x * y for s, y in zip(sums, known)]
-        sums[i] = 1.0
         inverse.append([s / pivot for s in sums])
         factor.append(row + [pivot])
-    return inverse
+    return inverse if all(math.isfinite(x) for row in inverse for x in row) else None
 
 
 def is_definite(entries, n):
     """Whether every symmetric matrix in the ball matrix is positive definite."""
     t = inverse_factor([float(entry.mid()) for entry in entries], n)
-    if t is None or not all(math.isfinite(x) for row in t for x in row):
+    if t is None:
         return False
     t = arb_mat(t)
-    near_one = (t * arb_mat(n, n, entries) * t.transpose()).entries()
+    off = (t * arb_mat(n, n, entries) * t.transpose()).entries()
     for i in range(n):
-        near_one[i * n + i] -= 1
-        if not sum((entry.abs_upper() for entry in near_one[i * n : i * n + n]), arb(0)) < 1:
-            return False
-    return True
+        off[i * n + i] -= 1
+    return all(sum((x.abs_upper() for x in off[i * n : i * n + n]), arb(0)) < 1 for i in range(n))
 
 
 class Family:
-    """A symmetric matrix on a piece, enclosed at points and over cells; `slack` are rows δ that border it, see `falling`."""
+    """A symmetric matrix on a piece that starts at ρ = start. `assemble` makes it of the entries of `sums` and of what a cell carries;
+    it is affine in the entries, and `constant` is 0 for an error of theirs."""
 
-    def __init__(self, place, base, slack=None):
-        self.place, self.n, self.m = place, base.shape[0], slack.shape[0] if slack else 0
-        sums = [base] + ([slack] if slack else [])
+    def __init__(self, place, sums, assemble=lambda entries, extra, constant: entries):
+        self.place, self.assemble = place, assemble
         self.keys = sorted(set().union(*(part.terms for part in sums)))
         entries = lambda part, key: part.terms[key].entries() if key in part.terms else [arb(0)] * mul(*part.shape)
-        rows = [sum((entries(part, key) for part in sums), []) for key in self.keys]
-        self.coefficients = arb_mat(rows) if rows else arb_mat(1, self.n * self.n)
+        rows = [reduce(add, (entries(part, key) for part in sums)) for key in self.keys]
+        self.coefficients = arb_mat(rows or [[0] * sum(mul(*part.shape) for part in sums)])
 
-    def scalars(self, t, second):
+    def scalars(self, t, is_bend):
         """t^j cos kρ …, or their second derivatives, for t in a ball of the piece."""
-        start, omega = self.place
-        rho, waves, out = start + omega * t, {}, []
+        (start, omega), waves, values = self.place, {}, []
         for j, k, s in self.keys:
             if k not in waves:
-                waves[k] = (rho * k).sin_cos()
+                waves[k] = ((start + omega * t) * k).sin_cos()
             sine, cosine = waves[k]
             wave, slope = (sine, k * cosine) if s else (cosine, -k * sine)
-            if not second:
-                out.append(t**j * wave)
-                continue
-            value = -(k * omega) ** 2 * t**j * wave
-            if j > 0:
+            value = -((k * omega) ** 2) * t**j * wave if is_bend else t**j * wave
+            if is_bend and j > 0:
                 value += 2 * j * t ** (j - 1) * omega * slope
-            if j > 1:
+            if is_bend and j > 1:
                 value += j * (j - 1) * t ** (j - 2) * wave
-            out.append(value)
-        return out or [arb(0)]
+            values.append(value)
+        return values or [arb(0)]
 
-    def over(self, rows):
-        return (arb_mat(rows) * self.coefficients).tolist()
-
-    def bordered(self, entries, c, corner):
-        """[M, δᵀ; δ, 4 diag c] with δᵢ = gᵢ + cᵢdᵢ, from the entries of M, g and d."""
-        if c is None:
-            return entries
-        n, m, half = self.n, self.m // 2, self.n + self.m // 2
-        whole = [[arb(0)] * half for _ in range(half)]
-        for i in range(n):
-            whole[i][:n] = entries[i * n : i * n + n]
-        for i in range(half - n):
-            for j in range(n):
-                g, d = entries[n * n + i * n + j], entries[n * n + (half - n + i) * n + j]
-                whole[n + i][j] = whole[j][n + i] = g + c[i] * d
-            whole[n + i][n + i] = corner * 4 * c[i]
-        return sum(whole, [])
+    def over(self, balls, is_bend):
+        return (arb_mat([self.scalars(t, is_bend) for t in balls]) * self.coefficients).tolist()
 
     def is_definite_on(self, cells, halvings=HALVINGS):
-        """Whether it is on every cell [a, b, c] of t; cells follow each other."""
-        ends = [arb(cells[0][0])] + [arb(b) for _, b, _ in cells]
-        values = self.over([self.scalars(t, False) for t in ends])
-        balls = [arb((arb(a) + b) / 2, ((arb(b) - a) / 2).abs_upper()) for a, b, _ in cells]
-        bends = self.over([self.scalars(t, True) for t in balls])
-        for (a, b, c), left, right, bend in zip(cells, values, values[1:], bends):
-            # [-(b - a)²/8, 0]
-            share = arb(-1, 1) * ((arb(b) - a) ** 2 / 16)
-            size, error = self.n + self.m // 2, self.bordered([share * x for x in bend], c, 0)
-            add = lambda value: [x + e for x, e in zip(self.bordered(value, c, 1), error)]
-            if not (is_definite(add(left), size) and is_definite(add(right), size)):
-                middle = a + (b - a) / 2
-                if halvings == 0 or not a < middle < b:
-                    return False
-                if not self.is_definite_on([[a, middle, c], [middle, b, c]], halvings - 1):
-                    return False
+        """Whether it is on every cell [a, b, extra] of t; cells follow each other."""
+        values = self.over([arb(cells[0][0])] + [arb(b) for _, b, _ in cells], False)
+        bends = self.over([arb((arb(a) + b) / 2, ((arb(b) - a) / 2).abs_upper()) for a, b, _ in cells], True)
+        for (a, b, extra), left, right, bend in zip(cells, values, values[1:], bends):
+            share = arb(-1, 1) * (arb(b) - a) ** 2 / 16  # [-(b - a)²/8, 0]
+            error = self.assemble([share * x for x in bend], extra, 0)
+            sums = ([x + e for x, e in zip(self.assemble(end, extra, 1), error)] for end in (left, right))
+            middle = a + (b - a) / 2
+            if not all(is_definite(entries, math.isqrt(len(entries))) for entries in sums) and not (
+                halvings > 0
+                and a < middle < b
+                and self.is_definite_on([[a, middle, extra], [middle, b, extra]], halvings - 1)
+            ):
+                return False
         return True
-
 
 # ------------------------------------------------------------------------------------------------------------- the designs
 
-
 def plant_of(plant):
     """A(ρ) = ∂f/∂x and B(ρ) = ∂f/∂u at rest, u*, and where ρ is in x; derived by hand from ẋ = f(x, u)."""
-    one = lambda rows, columns, entries, key=(0, 0, 0): Sum(
-        (rows, columns),
-        {key: arb_mat([[entries.get((i, j), arb(0)) for j in range(columns)] for i in range(rows)])},
-    )
     if plant["name"] == "quadrotor":
         # v̇ = (sin θ, -sin φ cos θ, cos φ cos θ) ΣF/m - (0, 0, g), ṙ = v,
         # ṗ = (F₂ - F₄)ℓ/I_x - …qr, q̇ = (F₃ - F₁)ℓ/I_y - …pr, ṙ = (F₁ - F₂ + F₃ - F₄)d/I_z - …pq,
@@ -323,14 +299,14 @@ def plant_of(plant):
         require(all(plant[key] > 0 for key in keys), "a parameter of the quadrotor is not positive")
         mass, g, ix, iy, iz, arm, drag = (arb(plant[key]) for key in keys)
         g, by_mass, p, q, r = (ROUNDED * x for x in (g, 1 / mass, arm / ix, arm / iy, drag / iz))
-        a = {(3, 0): arb(1), (4, 1): arb(1), (5, 2): arb(1), (11, 8): arb(1), (0, 10): g, (1, 9): -g}
+        still = {(3, 0): arb(1), (4, 1): arb(1), (5, 2): arb(1), (11, 8): arb(1), (0, 10): g, (1, 9): -g}
+        cosine, sine = {(9, 6): arb(1), (10, 7): arb(1)}, {(9, 7): arb(-1), (10, 6): arb(1)}
         b = {(2, i): by_mass for i in range(4)}
         b |= {(6, 1): p, (6, 3): -p, (7, 2): q, (7, 0): -q, (8, 0): r, (8, 1): -r, (8, 2): r, (8, 3): -r}
-        turning = one(12, 12, {(9, 6): arb(1), (10, 7): arb(1)}, (0, 1, 0)) + one(
-            12, 12, {(9, 7): arb(-1), (10, 6): arb(1)}, (0, 1, 1)
-        )
+        fill = lambda entries, columns: arb_mat([[entries.get((i, j), 0) for j in range(columns)] for i in range(12)])
+        a = {(0, 0, 0): fill(still, 12), (0, 1, 0): fill(cosine, 12), (0, 1, 1): fill(sine, 12)}
         hover = plant["mass_kg"] * plant["gravity_m_s2"] / 4
-        return one(12, 12, a) + turning, one(12, 4, b), [hover] * 4, 11
+        return Sum((12, 12), a), Sum((12, 4), {(0, 0, 0): fill(b, 4)}), [hover] * 4, 11
     if plant["name"] == "linear":
         return Sum.constant(plant["A"]), Sum.constant(plant["B"]), [0.0] * len(plant["B"][0]), None
     # ẋ₁ = x₂, ẋ₂ = u; of the pendulum ẋ₂ = -0.1 x₂ + sin x₁ + u
@@ -343,114 +319,96 @@ class Design:
     """The closed loop of a plant and a design, and V = xᵀPx or xᵀY⁻¹x."""
 
     def __init__(self, line):
-        self.line, controller = line, line["controller"]
+        self.line, self.points, self.pieces, controller = line, line["points"], line["pieces"], line["controller"]
         self.a, self.b, trim, self.parameter = plant_of(line["plant"])
-        self.n, self.m = self.b.shape
+        (self.n, self.m), turns = self.b.shape, self.parameter is not None
         require(controller["operating_input"] == trim, "the operating input is not that of the plant")
         require(controller["scheduling_state"] == self.parameter, "the scheduling state is not that of the plant")
-        self.q, self.r = line["weights"]["q"], line["weights"]["r"]
-        symmetric(self.q, self.n, "Q"), symmetric(self.r, self.m, "R")
-        require(semidefinite(self.q, False) and semidefinite(self.r, True), "Q is not semidefinite, or R not definite")
+        self.q, self.r = check_weights(line["weights"], self.n, self.m)
         self.sigma = [self.room(controller["limits"], i) for i in range(self.m)]
         require(all(sigma is None or sigma > 0 for sigma in self.sigma), "an input has no room")
         # ρ = -π + ω t, t from 0 to the number of pieces, once around the circle
-        self.pieces, self.points = line["pieces"], line["points"]
-        require(0 < self.pieces <= 4096 and (self.parameter is not None or self.pieces == 1), "the pieces are wrong")
-        self.low = arb(-math.pi) if self.parameter is not None else arb(0)
-        self.omega = 2 * arb.pi() / self.pieces if self.parameter is not None else arb(0)
-        self.gain = controller["schedule"]
-        self.check_schedule()
-        moving = line.get("rate_bounded")
-        has_auxiliary = all(point["auxiliary_gain"] is not None for point in self.points)
-        require(has_auxiliary or all(point["auxiliary_gain"] is None for point in self.points), "some F are missing")
-        given = lambda value, rows: function(value, (rows, self.n)) if has_auxiliary else None
+        require(0 < self.pieces <= 4096 if turns else self.pieces == len(self.points) == 1, "pieces are wrong")
+        self.low, self.omega = (arb(-math.pi), 2 * arb.pi() / self.pieces) if turns else (arb(0), arb(0))
+        self.check_schedule(controller["schedule"])
+        moving, joined = line.get("rate_bounded"), line.get("joined")
         self.inverse = moving is not None
-        if moving:
-            matrices = moving["y"]["coefficients"]
-            self.lyapunov, self.low_gain = function(moving["y"], (self.n, self.n)), given(moving["l"], self.m)
-        elif self.parameter is not None:
-            matrices = line["joined"]["p"]["coefficients"]
-            self.lyapunov = function(line["joined"]["p"], (self.n, self.n))
-            self.low_gain = given(line["joined"]["auxiliary"], self.m)
-        else:
-            require(len(self.points) == 1, "a plant without a parameter has one point")
-            matrices, self.lyapunov = [self.points[0]["p"]], Sum.constant(self.points[0]["p"])
-            self.low_gain = Sum.constant(self.points[0]["auxiliary_gain"]) if has_auxiliary else None
-        for k, rows in enumerate(matrices):
-            symmetric(rows, self.n, f"matrix {k} of the Lyapunov function")
+        point = lambda key: {"basis": [{"function": "constant"}], "coefficients": [self.points[0][key]]}
+        given = (moving["y"], moving["l"]) if moving else (joined["p"], joined["auxiliary"]) if joined else (
+            point("p"), point("auxiliary_gain"))
+        for rows in given[0]["coefficients"]:
+            symmetric(rows, self.n, "a matrix of the Lyapunov function")
+        has_auxiliary = {p["auxiliary_gain"] is not None for p in self.points}
+        require(len(has_auxiliary) == 1, "some auxiliary gains are missing")
+        self.lyapunov = function(given[0], (self.n, self.n))
+        self.low_gain = function(given[1], (self.m, self.n)) if True in has_auxiliary else None
+        # inputs that lie between rows of F and K on the set, and those that could reach a limit
+        self.saturating = [i for i in range(self.m) if self.low_gain and self.sigma[i] is not None]
+        low = [self.gains(piece)[1] for piece in range(self.pieces)]
+        self.limited = [i for i in range(self.m) if self.sigma[i] is not None and any(k.rows([i]).terms for k in low)]
         self.check_points()
 
     def room(self, limits, i):
         """σᵢ: |uᵢ - u*ᵢ| ≤ σᵢ is within the limits; None where there are none."""
-        trim = Fraction(self.line["controller"]["operating_input"][i])
-        least, most = limits["min"][i], limits["max"][i]
-        sides = [trim - Fraction(least)] if least is not None else []
-        sides += [Fraction(most) - trim] if most is not None else []
-        return min(sides) if sides else None
+        trim, least, most = self.line["controller"]["operating_input"][i], limits["min"][i], limits["max"][i]
+        sides = [Fraction(trim) - Fraction(least)] if least is not None else []
+        return min(sides + ([Fraction(most) - Fraction(trim)] if most is not None else []), default=None)
 
-    def check_schedule(self):
+    def check_schedule(self, schedule):
         """Knots are where they should be, and gains at knots those of the points."""
-        schedule, gains = self.gain, [point["gain"] for point in self.points]
-        for k, point in enumerate(self.points if self.parameter is not None else []):
-            off = arb(point["rho"]) - (self.low + 2 * arb.pi() * k / len(self.points))
+        self.gain, gains, rhos = schedule, [p["gain"] for p in self.points], [p["rho"] for p in self.points]
+        for k, rho in enumerate(rhos if self.parameter is not None else []):
+            off = arb(rho) - self.low - 2 * arb.pi() * k / len(rhos)
             require(off.abs_upper() < 1e-12, "a grid point is not where it should be")
-        require(all((len(k), len(k[0])) == (self.m, self.n) for k in gains), "a gain is of another size")
         if schedule["kind"] == "grid":
             require(self.parameter is not None and len(gains) == self.pieces > 3, "the knots are wrong")
             require(abs(schedule["period"] - 2 * math.pi) < 1e-12, "the gains are not periodic")
-            require(schedule["parameters"] == [point["rho"] for point in self.points], "knots differ from grid points")
+            require(schedule["parameters"] == rhos, "knots differ from grid points")
             require(schedule["gains"] == gains, "scheduled gains differ from those of the grid points")
         elif schedule["kind"] == "constant":
-            require(len(gains) == 1 and schedule["gain"] == gains[0], "the gain differs from that of the point")
+            require([schedule["gain"]] == gains, "the gain differs from that of the point")
         else:
             require(schedule["kind"] == "vertices" and self.parameter is not None, "the schedule is not known")
-            weights = schedule["weights"]
-            corners = list(itertools.product((-1.0, 1.0), repeat=len(weights["features"])))
-            require(sorted(map(tuple, weights["corners"])) == corners, "the corners are not those of a box")
-            for point in self.points:
-                off = self.schedule(0).at(arb(point["rho"])) - arb_mat(point["gain"])
-                largest = max(abs(x) for row in point["gain"] for x in row)
-                require(all(x.abs_upper() < 1e-3 * largest for x in off.entries()), "the gain is far from the points'")
+            corners = itertools.product((-1.0, 1.0), repeat=len(schedule["weights"]["features"]))
+            require(sorted(map(tuple, schedule["weights"]["corners"])) == list(corners), "corners are not those of a box")
+            for rho, gain in zip(rhos, gains):
+                off, size = self.schedule(0).at(arb(rho)) - arb_mat(gain), max(abs(x) for row in gain for x in row)
+                require(all(x.abs_upper() < 1e-3 * size for x in off.entries()), "the gain is far from the points'")
 
     def check_points(self):
-        """P (and F) of the points is that of the function up to rounding, the same data twice: P Y = I, or the harmonics of P."""
+        """P (and F) of the points is that of the function up to rounding, the same data twice: PY = I, or the harmonics of P."""
         for point in self.points:
             symmetric(point["p"], self.n, "P of a point")
             if self.inverse:
-                off = self.lyapunov.at(arb(point["rho"])) * arb_mat(point["p"])
-                unit = all((off[i, j] - int(i == j)).abs_upper() < 1e-6 for i in range(self.n) for j in range(self.n))
-                require(unit, "P of a point is not the inverse of Y")
-        pairs = [(self.lyapunov, "p")] + ([(self.low_gain, "auxiliary_gain")] if self.low_gain is not None else [])
+                off = self.lyapunov.at(arb(point["rho"])) * arb_mat(point["p"]) - unit(self.n).at(arb(0))
+                require(all(x.abs_upper() < 1e-6 for x in off.entries()), "P of a point is not the inverse of Y")
+        pairs = [(self.lyapunov, "p"), (self.low_gain, "auxiliary_gain")]
         for total, key in pairs if self.parameter is not None and not self.inverse else []:
-            given, count = [arb_mat(point[key]) for point in self.points], len(self.points)
-            size = max(x.abs_upper() for rows in given for x in rows.entries())
-            for k, s in itertools.product(range((count - 1) // 2 + 1), (0, 1)):
-                waves = [(arb(point["rho"]) * k).sin_cos()[1 - s] for point in self.points]
+            given, count = [arb_mat(p[key]) for p in self.points if total], len(self.points)
+            for k, s in itertools.product(range((count - 1) // 2 + 1), (0, 1)) if total else []:
+                waves = [(arb(p["rho"]) * k).sin_cos()[1 - s] for p in self.points]
                 fitted = sum((p * w for p, w in zip(given, waves)), arb_mat(*total.shape)) * (arb(2 if k else 1) / count)
-                off = fitted - total.terms.get((0, k, s), arb_mat(*total.shape))
-                require(all(x.abs_upper() < 1e-10 * size for x in off.entries()), f"harmonic {k} is not that of the points")
+                off, size = fitted - total.terms.get((0, k, s), arb_mat(*total.shape)), max(given[0].entries(), key=abs)
+                require(all(x.abs_upper() < 1e-10 * abs(size) for x in off.entries()), "a harmonic is not that of the points")
 
     def schedule(self, piece):
         """K on a piece: the cubic in t through the knots before, at both ends and after it; or Σ wᵢ(ρ)Kᵢ."""
-        shape, schedule = (self.m, self.n), self.gain
+        shape, schedule, total = (self.m, self.n), self.gain, Sum((self.m, self.n), {})
         if schedule["kind"] == "constant":
             return Sum.constant(schedule["gain"])
         if schedule["kind"] == "vertices":
-            total = Sum(shape, {})
             for corner, gain in zip(schedule["weights"]["corners"], schedule["gains"], strict=True):
-                weight = Sum.constant([[1.0]])
+                weight = unit(1)  # Π (1 + c feature)/2
                 for c, feature in zip(corner, schedule["weights"]["features"], strict=True):
-                    wave = {"cos": 0, "sin": 1}[feature]
-                    weight @= Sum((1, 1), {(0, 0, 0): arb_mat([[0.5]]), (0, 1, wave): arb_mat([[c / 2]])})
+                    wave = (0, 1, {"cos": 0, "sin": 1}[feature])
+                    weight @= Sum((1, 1), {(0, 0, 0): arb_mat([[0.5]]), wave: arb_mat([[c / 2]])})
                 total += Sum(shape, {key: arb_mat(gain) * w[0, 0] for key, w in weight.terms.items()})
             return total
-        total, nodes = Sum(shape, {}), (-1, 0, 1, 2)
-        for node in nodes:
+        for node in (-1, 0, 1, 2):
             weight = [Fraction(1)]  # Π (t - other)/(node - other), by powers of t
-            for other in nodes:
-                if other != node:
-                    down, up = [x * -other for x in weight] + [0], [0] + weight
-                    weight = [Fraction(x + y, node - other) for x, y in zip(down, up)]
+            for other in {-1, 0, 1, 2} - {node}:
+                down, up = [x * -other for x in weight] + [0], [0] + weight
+                weight = [Fraction(x + y, node - other) for x, y in zip(down, up)]
             gain = arb_mat(schedule["gains"][(piece + node) % self.pieces])
             total += Sum(shape, {(j, 0, 0): gain * ball(w) for j, w in enumerate(weight)})
         return total
@@ -458,178 +416,155 @@ class Design:
     def place(self, piece):
         return self.low + self.omega * piece, self.omega
 
-    def saturating(self):
-        """Inputs that lie between rows of F and K on the set."""
-        return [i for i in range(self.m) if self.low_gain is not None and self.sigma[i] is not None]
-
     def gains(self, piece):
         """K, and the rows that are not to saturate; both times Y in the inverse form."""
-        k = self.schedule(piece)
-        k = k @ self.lyapunov if self.inverse else k
-        low = [(self.low_gain if i in self.saturating() else k).rows([i]) for i in range(self.m)]
-        return k, blocks([[row] for row in low])
-
-    def limited(self):
-        """Inputs that could reach a limit."""
-        low = [self.gains(piece)[1] for piece in range(self.pieces)]
-        return [i for i in range(self.m) if self.sigma[i] is not None and any(k.rows([i]).terms for k in low)]
+        k = self.schedule(piece) @ (self.lyapunov if self.inverse else unit(self.n))
+        return k, blocks([[(self.low_gain if i in self.saturating else k).rows([i])] for i in range(self.m)])
 
     def definite(self, piece, floor=0.0):
-        """Y ⪰ floor I, or P ⪯ I/floor; with 0 that it is positive definite."""
-        unit = lambda x: Sum.constant([[x if i == j else 0.0 for j in range(self.n)] for i in range(self.n)])
+        """P ≻ 0; or Y ⪰ floor I, which is P ⪯ I/floor."""
         if floor == 0.0 or self.inverse:
-            return Family(self.place(piece), self.lyapunov - unit(floor))
-        return Family(self.place(piece), unit(1.0) - self.lyapunov.times(floor))
+            return Family(self.place(piece), [self.lyapunov - unit(self.n, floor)])
+        return Family(self.place(piece), [unit(self.n) - self.lyapunov.times(floor)])
 
     def unsaturated(self, piece, i, level):
         """[σ²/γ, f; fᵀ, P] ≻ 0, or the same with fY and Y: (fx)² < σ² where V ≤ γ."""
-        row = self.gains(piece)[1].rows([i])
-        corner = Sum((1, 1), {(0, 0, 0): arb_mat([[ball(self.sigma[i] ** 2) / arb(level)]])})
-        return Family(self.place(piece), blocks([[corner, row], [row.t, self.lyapunov]]))
+        row, corner = self.gains(piece)[1].rows([i]), arb_mat([[ball(self.sigma[i] ** 2) / arb(level)]])
+        return Family(self.place(piece), [blocks([[Sum((1, 1), {(0, 0, 0): corner}), row], [row.t, self.lyapunov]])])
 
-    def falling(self, piece, flying, rate, factor, share):
-        """-V̇ - (share/factor)(xᵀQx + uᵀRu) > 0 for the input rows of K that are `flying`, the others being of F.
+    def falling(self, piece, flying, rate, ratio):
+        """-V̇ - ratio (xᵀQx + uᵀRu) > 0, input rows of K where they are `flying`, the others of F.
 
-        V = xᵀPx:     -(P(A - BS) + ·ᵀ + ρ̇ P′) - (share/factor)(Q + SᵀRS)
-        V = xᵀY⁻¹x:   -(AY - BG + ·ᵀ) + ρ̇ Y′ - (share/factor)(YQY + GᵀRG),  G = SY, between Y⁻¹
+        V = xᵀPx:     -(P(A - BS) + ·ᵀ + ρ̇ P′) - ratio (Q + SᵀRS)
+        V = xᵀY⁻¹x:   -(AY - BG + ·ᵀ) + ρ̇ Y′ - ratio (YQY + GᵀRG),  G = SY, between Y⁻¹
 
-        With flying = "rows" an input is f x + θ(k - f)x, 0 ≤ θ ≤ 1, and θ² ≤ θ: what S = F leaves is at least that less θ Σ (dᵢx)(gᵢx),
-        d = k - f, g = (share/factor) rᵢ(k + f) - 2bᵢᵀP; and (dx)(gx) ≤ ((g + cd)x)²/4c for c > 0 (its Schur complement borders).
+        With flying = "rows" an input is f x + θ(k - f)x, 0 ≤ θ ≤ 1, and θ² ≤ θ: the form is at least that of S = F less Σ θ (dᵢx)(gᵢx),
+        d = k - f, g = ratio rᵢ(k + f) - 2bᵢᵀP; and (dx)(gx) ≤ ((g + cd)x)²/4c for c > 0, which borders: [M, δᵀ; δ, 4c], δ = g + cd.
         """
-        w, q, r = self.lyapunov, Sum.constant(self.q), Sum.constant(self.r)
-        k, low = self.gains(piece)
-        saturating, ratio = self.saturating(), arb(share) / arb(factor)
-        if saturating:
-            flies = lambda i: i not in saturating or (flying != "rows" and i in flying)
-            s = blocks([[(k if flies(i) else low).rows([i])] for i in range(self.m)])
-        else:
-            s = k
+        w, q, r, (k, low) = self.lyapunov, Sum.constant(self.q), Sum.constant(self.r), self.gains(piece)
+        of_k = lambda i: i not in self.saturating or (flying != "rows" and i in flying)
+        s = blocks([[(k if of_k(i) else low).rows([i])] for i in range(self.m)])
         if self.inverse:
             flow, stage, motion = self.b @ s - self.a @ w, w @ q @ w + s.t @ r @ s, w.by_rho()
         else:
             flow, stage, motion = w @ (self.b @ s - self.a), q + s.t @ r @ s, w.by_rho().times(-1)
-        base, slack = flow + flow.t + motion.times(rate) - stage.times(ratio), None
-        if saturating and flying == "rows":
-            require(all(self.r[i][j] == 0 for i in range(self.m) for j in range(i)), "R is not diagonal")
-            pb = self.b if self.inverse else w @ self.b
-            push = (r @ (k + low)).times(ratio) - pb.t.times(2)
-            slack = blocks([[push.rows(saturating)], [(k - low).rows(saturating)]])
-        return Family(self.place(piece), base, slack)
+        base = flow + flow.t + motion.times(rate) - stage.times(ratio)
+        if flying != "rows":
+            return Family(self.place(piece), [base])
+        require(all(self.r[i][j] == 0 for i in range(self.m) for j in range(i)), "R is not diagonal")
+        push = (r @ (k + low)).times(ratio) - (self.b if self.inverse else w @ self.b).t.times(2)
+        n, rows = self.n, len(self.saturating)
 
-    def increment(self, piece, sample_time_s):
-        """E with x₊ = (I + TE)x for an input held for T: E = Φ(A - BK), Φ = Σ (AT)^k/(k + 1)!."""
-        at, power = self.a.times(sample_time_s), Sum.constant([[float(i == j) for j in range(self.n)] for i in range(self.n)])
-        series, k, terms = power, 0, 24
-        while power.terms and k < terms:
-            k += 1
-            power = (power @ at).times(arb(1) / (k + 1))
+        def assemble(entries, c, constant):
+            part = lambda first: [entries[n * (first + i) : n * (first + i + 1)] for i in range(rows)]
+            delta = [[g + weight * d for g, d in zip(*pair)] for weight, pair in zip(c, zip(part(n), part(n + rows)))]
+            top = [entries[n * i : n * i + n] + [row[i] for row in delta] for i in range(n)]
+            corner = lambda i: [constant * 4 * c[i] if i == j else arb(0) for j in range(rows)]
+            return sum(top + [row + corner(i) for i, row in enumerate(delta)], [])
+        return Family(self.place(piece), [base, push.rows(self.saturating), (k - low).rows(self.saturating)], assemble)
+
+    def sampled(self, piece, time):
+        """With X of the cell: [-(EᵀX + XE), TEᵀX; TXE, TX] ≻ 0, so that X - (I + TE)ᵀX(I + TE) ≻ 0 and X ≻ 0.
+
+        x₊ = (I + TE)x is the loop whose input is held for T: E = Φ(A - BK), Φ = Σ (AT)^k/(k + 1)!.
+        """
+        at, power, n = self.a.times(time), unit(self.n), self.n
+        series, k = power, 0
+        while power.terms and k < SERIES:
+            k, power = k + 1, (power @ at).times(arb(1) / (k + 2))
             series += power
-        if power.terms:
-            # ‖rest‖ ≤ Σ_{k > N} a^k/(k + 1)! ≤ 2 a^(N+1)/(N + 2)! for the row-sum norm a ≤ N/2 of AT
+        if power.terms:  # the rest is at most Σ_{k > N} a^k/(k + 1)! ≤ 2 a^{N+1}/(N + 2)! for the norm a ≤ N/2 of AT
             require(set(at.terms) == {(0, 0, 0)}, "the series of a plant with a parameter does not end")
-            rows = at.terms[0, 0, 0].tolist()
-            norm = max((sum((x.abs_upper() for x in row), arb(0)) for row in rows), key=float).abs_upper()
-            require(norm < terms / 2, "the sample time is too long")
-            rest = arb(0, 2 * norm ** (terms + 1) / arb.fac_ui(terms + 2))
-            series += Sum((self.n, self.n), {(0, 0, 0): arb_mat([[rest] * self.n] * self.n)})
-        return series @ (self.a - self.b @ self.schedule(piece))
+            norm = reduce(arb.max, (sum((x.abs_upper() for x in row), arb(0)) for row in at.terms[0, 0, 0].tolist()))
+            require(norm < SERIES / 2, "the sample time is too long")
+            rest = arb(0, (2 * norm ** (SERIES + 1) / arb.fac_ui(SERIES + 2)).abs_upper())
+            series += Sum((n, n), {(0, 0, 0): arb_mat([[rest] * n] * n)})
 
-
-def ball(fraction):
-    return arb(fraction.numerator) / arb(fraction.denominator)
-
-
-# --------------------------------------------------------------------------------------------------------------- the claims
+        def assemble(entries, x, constant):
+            xe = x * arb_mat(n, n, entries)
+            flow, side, corner = ((xe + xe.transpose()) * arb(-1), xe * arb(time), x * arb(time * constant))
+            top = zip(flow.tolist(), side.transpose().tolist())
+            return sum((left + right for left, right in itertools.chain(top, zip(side.tolist(), corner.tolist()))), [])
+        return Family(self.place(piece), [series @ (self.a - self.b @ self.schedule(piece))], assemble)
 
 
 class Polytope:
     """A(ρ) = Σ ρᵢAᵢ, B(ρ) = Σ ρᵢBᵢ; V = xᵀPx, u = -Σ ρᵢKᵢx, or V = xᵀ(Σ ρᵢYᵢ)⁻¹x, u = -(Σ ρᵢLᵢ)(Σ ρᵢYᵢ)⁻¹x."""
 
+    parameter = None
+
     def __init__(self, line):
-        self.line, self.common = line, "P" in line
-        self.a, self.b = ([arb_mat(rows) for rows in line[key]] for key in "AB")
-        self.count, self.n, self.m = len(self.a), self.a[0].nrows(), self.b[0].ncols()
+        self.line, self.common, self.count = line, "P" in line, len(line["A"])
+        self.n, self.m = len(line["B"][0]), len(line["B"][0][0])
         given = [line["P"]] * self.count if self.common else line["Y"]
-        gains = line["K" if self.common else "L"]
-        sizes = [(self.a, self.n, self.n), (self.b, self.n, self.m), (list(map(arb_mat, gains)), self.m, self.n)]
-        for matrices, rows, columns in sizes:
-            require(len(matrices) == self.count, "a vertex is missing")
-            require(all((x.nrows(), x.ncols()) == (rows, columns) for x in matrices), "a matrix is of another size")
         for rows in given:
             symmetric(rows, self.n, "P or Y")
-        self.lyapunov, self.gain = list(map(arb_mat, given)), sizes[2][0]
-        self.sigma = line["sigma"] or [None] * self.m
-        require(len(self.sigma) == self.m and all(s is None or s > 0 for s in self.sigma), "sigma is wrong")
+        def all_of(matrices, rows, columns):
+            each = [arb_mat(matrix) for matrix in matrices]
+            require(len(each) == self.count, "a vertex is missing")
+            require(all((x.nrows(), x.ncols()) == (rows, columns) for x in each), "a matrix is of another size")
+            return each
+        self.a, self.b = all_of(line["A"], self.n, self.n), all_of(line["B"], self.n, self.m)
+        self.lyapunov = all_of(given, self.n, self.n)
+        self.gain = all_of(line["K" if self.common else "L"], self.m, self.n)
         self.rates = [[0.0] * self.count] if self.common else line["rate_vertices"]
         require(self.rates and all(len(rates) == self.count for rates in self.rates), "rate vertices are wrong")
-        low = self.gain if line["F"] is None else [arb_mat(f) for f in line["F"]]
-        if line["F"] is not None and not self.common:
-            low = [f * y for f, y in zip(low, self.lyapunov)]
-        require(len(low) == self.count, "an F is missing")
-        self.saturating = [i for i in range(self.m) if line["F"] is not None and self.sigma[i] is not None]
-        self.low = [self.mixed(i, low, [j for j in range(self.m) if j not in self.saturating]) for i in range(self.count)]
         if line["weights"]:
-            self.q, self.r = line["weights"]["q"], line["weights"]["r"]
-            symmetric(self.q, self.n, "Q"), symmetric(self.r, self.m, "R")
-            require(semidefinite(self.q, False) and semidefinite(self.r, True), "Q or R is not definite")
-            self.q, self.r = arb_mat(self.q), arb_mat(self.r)
-
-    def mixed(self, i, low, flying):
-        rows = [(self.gain if k in flying else low)[i].tolist()[k] for k in range(self.m)]
-        return arb_mat(rows)
-
-    def limited(self):
+            self.q, self.r = map(arb_mat, check_weights(line["weights"], self.n, self.m))
+        self.sigma = line["sigma"] or [None] * self.m
+        require(len(self.sigma) == self.m and all(s is None or s > 0 for s in self.sigma), "sigma is wrong")
+        self.saturating = [i for i in range(self.m) if line["F"] and self.sigma[i] is not None]
+        f = all_of(line["F"], self.m, self.n) if line["F"] else self.gain
+        self.low = f if self.common or not line["F"] else [x * y for x, y in zip(f, self.lyapunov)]
+        self.low = self.mixed(set(range(self.m)) - set(self.saturating))
         moves = lambda i: any(not x.is_zero() for k in self.low for x in k.tolist()[i])
-        return [i for i in range(self.m) if self.sigma[i] is not None and moves(i)]
+        self.limited = [i for i in range(self.m) if self.sigma[i] is not None and moves(i)]
+
+    def mixed(self, flying):
+        """S at the vertices: rows of K or L where they are `flying`."""
+        pick = lambda k, f: arb_mat([(k if i in flying else f).tolist()[i] for i in range(self.m)])
+        return [pick(k, f) for k, f in zip(self.gain, self.low)]
 
     def matrices(self, claim):
         """All that have to be definite: Σ ρᵢρⱼ Mᵢⱼ ≻ 0 if every Mᵢᵢ ≻ 0 and Mᵢⱼ + Mⱼᵢ ≻ 0."""
         if claim["kind"] == "definite":
             yield from self.lyapunov
         elif claim["kind"] == "unsaturated":
-            for i, vertex in itertools.product(self.limited(), range(self.count)):
-                row = self.low[vertex].tolist()[i]
-                corner = ball(Fraction(self.sigma[i]) ** 2) / arb(claim["level"])
-                yield arb_mat([[corner] + row] + [[x] + y for x, y in zip(row, self.lyapunov[vertex].tolist())])
+            for i, (low, w) in itertools.product(self.limited, zip(self.low, self.lyapunov)):
+                row, corner = low.tolist()[i], ball(Fraction(self.sigma[i]) ** 2) / arb(claim["level"])
+                yield arb_mat([[corner] + row] + [[x] + y for x, y in zip(row, w.tolist())])
         else:
+            others = set(range(self.m)) - set(self.saturating)
             pairs = list(itertools.combinations_with_replacement(range(self.count), 2))
-            for size in range(len(self.saturating) + 1):
-                for flying in itertools.combinations(self.saturating, size):
-                    others = [i for i in range(self.m) if i not in self.saturating]
-                    s = [self.mixed(i, self.low, [*flying, *others]) for i in range(self.count)]
-                    for rates, (i, j) in itertools.product(self.rates, pairs):
-                        m = self.pair(i, j, s, rates, claim)
-                        yield m if i == j else m + self.pair(j, i, s, rates, claim)
+            for chosen in itertools.product((False, True), repeat=len(self.saturating)):
+                s = self.mixed(others | set(itertools.compress(self.saturating, chosen)))
+                for rates, (i, j) in itertools.product(self.rates, pairs):
+                    yield reduce(add, [self.pair(k, l, s, rates, claim) for k, l in {(i, j), (j, i)}])
 
     def pair(self, i, j, s, rates, claim):
-        """Mᵢⱼ of -V̇ - (xᵀQx + uᵀRu)/factor."""
+        """Mᵢⱼ of -V̇ - (xᵀQx + uᵀRu)/factor, as `Design.falling`."""
         w = self.lyapunov
         flow = w[0] * (self.b[i] * s[j] - self.a[i]) if self.common else self.b[i] * s[j] - self.a[i] * w[j]
-        m = flow + flow.transpose()
-        for rate, y in zip(rates, w):
-            m += y * arb(rate)
+        m = reduce(add, (y * arb(rate) for rate, y in zip(rates, w)), flow + flow.transpose())
         if claim["kind"] == "cost":
             stage = s[i].transpose() * self.r * s[j] + (self.q if self.common else w[i] * self.q * w[j])
             m -= (stage + stage.transpose()) / (2 * arb(claim["factor"]))
         return m
 
+# --------------------------------------------------------------------------------------------------------------- the claims
 
-def premises_hold(claims, claim, design):
+def check_premises(claims, claim, design):
     """Whether a claim rests on earlier claims of the right kind, about the same design, level and rate."""
     kind, premises = claim["kind"], [claims[number] for number in claim["premises"]]
-    twins = [other for other in claims if (other["design"], other["kind"]) == (claim["design"], kind)]
-    require(len(twins) == 1, f"there are {len(twins)} claims of this kind")
-    limited = kind not in ("definite", "sampled") and bool(design.limited())
-    between = ["unsaturated"] if limited else []
-    needed = {"definite": [], "sampled": [], "unsaturated": ["definite"], "decrease": ["definite", *between]}
-    needed["cost"] = needed["decrease"] + ["decrease"]
-    require(kind in needed, f"{kind} is not known")
+    require(sum((c["design"], c["kind"]) == (claim["design"], kind) for c in claims) == 1, "two claims are of one kind")
+    limited = kind not in ("definite", "sampled") and bool(design.limited)
+    falls = ["definite", "unsaturated"] if limited else ["definite"]
+    needed = {"definite": [], "sampled": [], "unsaturated": ["definite"], "decrease": falls, "cost": [*falls, "decrease"]}
     require([premise["kind"] for premise in premises] == needed[kind], "it does not rest on what it has to")
     require(all(premise["design"] == claim["design"] for premise in premises), "a premise is of another design")
-    require(kind in ("definite", "sampled") or (claim["level"] is None) != limited, "it needs a level, or none")
-    require(not limited or claim["level"] > 0, "the level is not positive")
-    for premise in premises[1:]:
-        require(premise["level"] == claim["level"], "a premise is about another level")
+    if kind not in ("definite", "sampled"):
+        require(claim["level"] > 0 if limited else claim["level"] is None, "it needs a level, or none")
+        require(all(p["level"] == claim["level"] for p in premises[1:]), "a premise is about another level")
     require(kind != "cost" or claim["factor"] >= 1, "the factor is below one")
     if kind in ("decrease", "cost") and isinstance(design, Design):
         require(claim["rate"] >= 0 and (kind != "cost" or premises[-1]["rate"] >= claim["rate"]), "the rate is wrong")
@@ -638,65 +573,43 @@ def premises_hold(claims, claim, design):
 
 def check_cells(design, claim):
     """Whether the cells of every variant cover the range without gaps."""
-    groups = claim["groups"]
-    variants = [None]
-    if claim["kind"] == "unsaturated":
-        variants = design.limited()
-    if claim["kind"] in ("decrease", "cost") and design.saturating() and groups[0]["variant"] != "rows":
-        subsets = itertools.product((False, True), repeat=design.m)
-        variants = [[i for i, flies in enumerate(subset) if flies] for subset in subsets]
-    elif claim["kind"] in ("decrease", "cost") and design.saturating():
-        variants = ["rows"]
-    order = lambda key: (key[0], str(key[1]))
-    found = sorted(((group["piece"], group["variant"]) for group in groups), key=order)
-    require(found == sorted(itertools.product(range(design.pieces), variants), key=order), "cells are missing")
+    groups, variants = claim["groups"], design.limited if claim["kind"] == "unsaturated" else [None]
+    if claim["kind"] in ("decrease", "cost") and design.saturating:
+        chosen = itertools.product((False, True), repeat=len(design.saturating))
+        all_rows = [list(itertools.compress(design.saturating, bits)) for bits in chosen]
+        variants = ["rows"] if groups[0]["variant"] == "rows" else all_rows
+    expected = itertools.product(range(design.pieces), variants)
+    require(sorted(map(str, expected)) == sorted(str((g["piece"], g["variant"])) for g in groups), "cells are missing")
     for group in groups:
         cells, piece = group["cells"], group["piece"]
         require(cells and cells[0][0] == piece and cells[-1][1] == piece + 1, "cells do not cover their piece")
         require(all(cell[0] < cell[1] for cell in cells), "a cell is empty")
         require(all(left[1] == right[0] for left, right in zip(cells, cells[1:])), "there is a gap between cells")
+        has_more = claim["kind"] == "sampled" or group["variant"] == "rows"
+        require(all(len(cell) == 2 + has_more for cell in cells), "a cell has too little or too much")
 
 
-def prove_group(design, claim, group):
-    """Whether a claim holds on the cells of a group."""
+def prove_group(design, claim, group, floor):
+    """Whether a claim holds on the cells of a group; that P is definite, above a floor."""
     kind, piece, variant = claim["kind"], group["piece"], group["variant"]
-    cells = [[cell[0] - piece, cell[1] - piece, cell[2] if len(cell) > 2 else None] for cell in group["cells"]]
-    require(all(len(cell) == (3 if kind == "sampled" or variant == "rows" else 2) for cell in group["cells"]), "a cell is odd")
+    cells = [[cell[0] - piece, cell[1] - piece, cell[2] if cell[2:] else None] for cell in group["cells"]]
     if kind == "sampled":
-        return prove_sampled(design, piece, cells, claim["sample_time_s"])
-    if kind == "definite":
-        families = [design.definite(piece, claim.get("floor", 0.0))]
-    elif kind == "unsaturated":
-        families = [design.unsaturated(piece, variant, claim["level"])]
-    else:
-        rates = [-claim["rate"], claim["rate"]] if claim["rate"] > 0 and design.parameter is not None else [0.0]
-        factor, share = (claim["factor"], 1) if kind == "cost" else (1, 0)
-        families = [design.falling(piece, variant, rate, factor, share) for rate in rates]
+        for cell in cells:
+            symmetric(cell[2], design.n, "X")
+            cell[2] = arb_mat(cell[2])
+        family = design.sampled(piece, claim["sample_time_s"])
+        return all(family.is_definite_on([cell]) for cell in cells)
     if variant == "rows":
-        many = len(design.saturating())
+        many = len(design.saturating)
         require(all(len(c) == many and min(c) > 0 for _, _, c in cells), "a weight of a row is not positive")
-        cells = [[a, b, list(map(arb, c))] for a, b, c in cells]
-    return all(family.is_definite_on(cells) for family in families)
-
-
-def prove_sampled(design, piece, cells, sample_time_s):
-    """With X of the cell: [-(EᵀX + XE), TEᵀX; TXE, TX] ≻ 0, so that X - (I + TE)ᵀX(I + TE) ≻ 0 and X ≻ 0."""
-    e, n, time = design.increment(piece, sample_time_s), design.n, arb(sample_time_s)
-    family = Family(design.place(piece), e)
-
-    def bordered(entries, c, corner):
-        xe = c * arb_mat(n, n, entries)
-        flow = (xe + xe.transpose()).tolist()
-        side, x = (xe * time).tolist(), (c * (time * corner)).tolist()
-        top = [[-flow[i][j] for j in range(n)] + [side[j][i] for j in range(n)] for i in range(n)]
-        return sum(top + [side[i] + x[i] for i in range(n)], [])
-
-    family.bordered, family.m = bordered, 2 * n
-    for cell in cells:
-        symmetric(cell[2], n, "X")
-        if not family.is_definite_on([[cell[0], cell[1], arb_mat(cell[2])]]):
-            return False
-    return True
+        cells = [[a, b, [arb(x) for x in c]] for a, b, c in cells]
+    if kind == "definite":
+        return design.definite(piece, floor).is_definite_on(cells)
+    if kind == "unsaturated":
+        return design.unsaturated(piece, variant, claim["level"]).is_definite_on(cells)
+    ratio = 1 / arb(claim["factor"]) if kind == "cost" else arb(0)
+    rates = {-claim["rate"], claim["rate"]} if design.parameter is not None else {0.0}
+    return all(design.falling(piece, variant, rate, ratio).is_definite_on(cells) for rate in rates)
 
 
 def check_motion(designs, claims, claim):
@@ -704,168 +617,142 @@ def check_motion(designs, claims, claim):
 
     x_ref = x₀ + Σ s⁽ᵏ⁾ Z_kΔ and u_ref = Σ s⁽ᵏ⁾ (U_k + ρ̇V_k)Δ leave w = Σ s⁽ᵏ⁺¹⁾ R_kΔ + ρ̇ Σ s⁽ᵏ⁾ S_kΔ,
     R_k = Z_k - AZ_{k+1} - BU_{k+1}, S_k = Z_k′ - BV_k. On V = γ: |2eᵀPw| ≤ 2√γ|w|/√y for Y ⪰ yI, and eᵀQe ≥ q|e|² ≥ qyγ for Q ⪰ qI,
-    so that |w| < q y^{3/2} √γ/(2 factor) leaves {V ≤ γ} invariant.
+    so that |w| < q y^{3/2} √γ/(2 factor) leaves {V ≤ γ} invariant. Each state moves alone, by at most `farthest`, ρ by half a turn.
     """
-    outer, d = designs[claim["design"]], claim["design"]
-    members = [d] + [k for k, line in enumerate(designs) if line.line.get("inner_of") == d]
-    supervisor = outer.line["controller"]["supervisor"]
+    outer, number = designs[claim["design"]], claim["design"]
+    members = [outer] + [design for design in designs if design.line.get("inner_of") == number]
+    supervisor, premises = outer.line["controller"]["supervisor"], [claims[k] for k in claim["premises"]]
     governor = supervisor["governor"]
-    motion, states = governor["motion"], governor["set_point_states"]
-    premises = [claims[number] for number in claim["premises"]]
-    require([p["kind"] for p in premises] == ["cost"] * len(members), "it does not rest on the costs of all members")
-    require([p["design"] for p in premises] == members and len(claim["bounds"]) == len(members), "a member is missing")
-    inner = [designs[k].line["controller"]["schedule"] for k in members[1:]]
+    motion, states, rate = governor["motion"], governor["set_point_states"], governor["motion"]["parameter_rate"]
+    require([(p["kind"], p["design"]) for p in premises] == [("cost", m.line["design"]) for m in members], "a member's cost is missing")
+    inner = [member.line["controller"]["schedule"] for member in members[1:]]
     require([member["schedule"] for member in supervisor["inner"]] == inner, "inner gains differ from those that fly")
-    require(len(set(states)) == len(states) and set(states) <= set(range(outer.n)), "the set-point states are wrong")
-    rate, most = motion["parameter_rate"], lambda bounds, i: bounds[i] if bounds[i] is not None else math.inf
-    for number in members:
-        design = designs[number]
-        require(design.line["plant"] == outer.line["plant"], "a member is of another plant")
-        require(design.line["weights"] == outer.line["weights"], "a member has other weights")
+    for member, premise in zip(members, premises):
+        require(all(member.line[k] == outer.line[k] for k in ("plant", "weights")), "a member is of another plant, or weights")
         for i, budget in enumerate(motion["input_budget"]):
-            all_of_it = design.room(motion["actuators"], i)
-            require(budget >= 0 and Fraction(budget) + design.sigma[i] <= all_of_it, "inputs exceed the actuators")
-    require(all(0 <= premise["rate"] <= rate for premise in premises), "a member moves faster than the reference allows for")
-    require(outer.parameter is not None or rate == 0, "there is no parameter that could move")
-    shape = lambda rows: (rows, len(states))
-    z = [Sum.constant([[float(i == j) for j in states] for i in range(outer.n)])]
+            most = member.room(motion["actuators"], i)
+            require(budget >= 0 and Fraction(budget) + member.sigma[i] <= most, "inputs exceed the actuators")
+        require(premise["rate"] <= rate, "a member moves faster than the reference allows for")
+    place = [[float(i == state) for state in states] for i in range(outer.n)]
+    of = lambda functions, rows: [function(value, (rows, len(states))) for value in functions]
+    z = [Sum.constant(place), *of(motion["states"], outer.n), Sum((outer.n, len(states)), {})]
+    u, v = of(motion["inputs"], outer.m), of(motion["inputs_by_rate"], outer.m)
+    v = v or [Sum((outer.m, len(states)), {})] * (len(u) - 1)
+    require(len(z) == len(u) + 1 == len(v) + 2, "the chain of the motion is broken")
     require(not (outer.a @ z[0]).terms, "the plant does not rest wherever it is put")
-    z += [function(value, shape(outer.n)) for value in motion["states"]] + [Sum(shape(outer.n), {})]
-    u = [function(value, shape(outer.m)) for value in motion["inputs"]]
-    v = [function(value, shape(outer.m)) for value in motion["inputs_by_rate"]] or [Sum(shape(outer.m), {})] * (len(u) - 1)
-    require(len(z) == len(u) + 1 and len(v) == len(u) - 1, "the chain of the motion is broken")
     if outer.parameter is not None:
         off = function(motion["parameter_flow"], (1, outer.n)) - outer.a.rows([outer.parameter])
-        require(all(off.bound(0, j) < 1e-12 for j in range(outer.n)), "the model's parameter moves otherwise")
+        require(all(off.bound(0, j) < 1e-12 for j in range(outer.n)), "the reference's parameter moves otherwise than the plant's")
     along = [z[k] - outer.a @ z[k + 1] - outer.b @ u[k] for k in range(len(u))]
-    across = [z[k + 1].by_rho() - outer.b @ v[k] for k in range(len(v))]
+    across = [z[k + 1].by_rho() - outer.b @ v[k] for k in range(len(v))] + [Sum(z[0].shape, {})]
     worst = arb(0)
     for j, state in enumerate(states):
         move = arb.pi() if state == outer.parameter else arb(claim["farthest"])
-        # |s⁽ᵏ⁾| ≤ bₖ from the bounds on inputs and states, and so pₖ ≤ b_m^{k/m} for every m ≥ k (see the profile of the reference)
-        bounds = [[] for _ in u]
-        if state == outer.parameter and governor["parameter_rate"] is not None:
-            bounds[0].append(arb(governor["parameter_rate"]) / move)
-        for k, bound in enumerate(bounds):
-            for i in range(outer.m):
-                used = u[k].bound(i, j) + (rate * v[k].bound(i, j) if k < len(v) else 0)
-                if used > 0:
-                    bound.append(arb(motion["input_budget"][i]) / (used * move))
-            for i in range(outer.n):
-                if most(motion["state_bounds"], i) < math.inf and z[k + 1].bound(i, j) > 0:
-                    bound.append(arb(motion["state_bounds"][i]) / (z[k + 1].bound(i, j) * move))
-        least = [min(bound) if bound else None for bound in bounds]
+        # |s⁽ᵏ⁾| ≤ bₖ by the bounds on inputs, states and rate; a profile with lengths T₁ ≥ T₂ ≥ … has |s⁽ᵏ⁾| ≤ pₖ = 1/(T₁⋯Tₖ) ≤ b_m^{k/m}, m ≥ k
+        least = []
+        for k in range(len(u)):
+            used = [(u[k].bound(i, j) + (rate * v[k].bound(i, j) if k < len(v) else 0), motion["input_budget"][i]) for i in range(outer.m)]
+            used += [(z[k + 1].bound(i, j), bound) for i, bound in enumerate(motion["state_bounds"]) if bound is not None]
+            if k == 0 and state == outer.parameter and governor["parameter_rate"] is not None:
+                used.append((arb(1), governor["parameter_rate"]))
+            least.append(min((arb(bound) / (size * move) for size, bound in used if size > 0), default=None))
         peak = lambda k: min(least[m] ** (arb(k + 1) / (m + 1)) for m in range(k, len(u)) if least[m] is not None)
         # a derivative that nothing bounds has to move nothing
         times = lambda k, size: peak(k) * size if size > 0 else size
-        total = arb(0)
-        for i in range(outer.n):
-            row = sum((times(k, along[k].bound(i, j)) for k in range(len(u))), arb(0))
-            row += sum((rate * times(k, across[k].bound(i, j)) for k in range(len(across))), arb(0))
-            total += (row * move) ** 2
-        worst = worst.max(total.abs_upper().sqrt())
-    for premise, bound in zip(premises, claim["bounds"]):
-        q, y = bound["q"], bound["y"]
-        shifted = [[Fraction(x) - (Fraction(q) if i == k else 0) for k, x in enumerate(row)] for i, row in enumerate(outer.q)]
-        require(q > 0 and y > 0 and semidefinite(shifted, False), "Q is not above its bound")
-        absorbed = arb(q) * arb(y) ** arb(1.5) * arb(premise["level"]).sqrt() / (2 * arb(premise["factor"]))
-        require(worst < absorbed, f"the sets do not absorb {worst}, but {absorbed}")
+        both = lambda k, i: along[k].bound(i, j) + rate * across[k].bound(i, j)
+        rows = (sum((times(k, both(k, i)) for k in range(len(u))), arb(0)) * move for i in range(outer.n))
+        worst = worst.max(sum((row**2 for row in rows), arb(0)).abs_upper().sqrt())
+    for premise, bound in zip(premises, claim["bounds"], strict=True):
+        shifted = [[Fraction(x) - (Fraction(bound["q"]) if i == k else 0) for k, x in enumerate(row)] for i, row in enumerate(outer.q)]
+        require(bound["q"] > 0 and bound["y"] > 0 and semidefinite(shifted, False), "Q is not above its bound")
+        absorbed = arb(bound["q"]) * arb(bound["y"]) ** arb(1.5) * arb(premise["level"]).sqrt() / (2 * arb(premise["factor"]))
+        require(worst < absorbed, f"the sets absorb {absorbed} and have to absorb {worst}")
 
 
-def statement(claim, design):
+def statement(claim):
     """The claim in words, from its own numbers."""
     on = f" on V <= {claim['level']!r}" if claim.get("level") is not None else ""
-    moving = ""
-    if isinstance(design, Design) and design.parameter is not None and "rate" in claim:
-        moving = f" for |rate| <= {claim['rate']!r}"
     return {
-        "definite": lambda: "the Lyapunov matrix is positive definite",
-        "unsaturated": lambda: f"the low gain does not saturate{on}",
-        "decrease": lambda: f"V decreases{on}{moving}" + (", so that this set is invariant" if on else ""),
-        "cost": lambda: f"the cost is at most {claim['factor']!r} V(x(0)){on}{moving}",
-        "sampled": lambda: f"the loop sampled at T = {claim['sample_time_s']!r} s is stable at every fixed parameter",
-        "motion": lambda: f"the reference moves as the model does, up to {claim['farthest']!r} along each state",
-    }[claim["kind"]]()
-
-
-def same(record, file):
-    """Whether what the record has of a design is what the design's file has."""
-    if isinstance(record, dict):
-        return isinstance(file, dict) and all(same(value, file.get(key)) for key, value in record.items())
-    if isinstance(record, list):
-        return isinstance(file, list) and len(record) == len(file) and all(map(same, record, file))
-    return record == file
+        "definite": "the Lyapunov matrix is positive definite",
+        "unsaturated": f"the low gain does not saturate{on}",
+        "decrease": f"V decreases{on} while the parameter's rate is at most {claim.get('rate')!r}",
+        "cost": f"the cost is at most {claim.get('factor')!r} V(x(0)){on} while it is at most {claim.get('rate')!r}",
+        "sampled": f"the loop sampled at T = {claim.get('sample_time_s')!r} s is stable at every fixed parameter",
+        "motion": f"the reference moves as the model does, each state by up to {claim.get('farthest')!r}",
+    }[claim["kind"]].replace(" while the parameter's rate is at most None", "").replace(" while it is at most None", "")
 
 
 def check_file(designs, path):
-    """Whether the record is about this file's design."""
+    """Whether every number that the record has of a design is the one of the design's file."""
+    def same(mine, given):
+        if isinstance(mine, dict):
+            return isinstance(given, dict) and all(same(value, given.get(key)) for key, value in mine.items())
+        if isinstance(mine, list):
+            return isinstance(given, list) and len(mine) == len(given) and all(map(same, mine, given))
+        return mine == given
     with open(path, encoding="utf-8") as text:
         file = json.load(text)
-    if isinstance(designs[0], Design):
-        added = ("design", "inner_of", "pieces", "joined")
-        files = [file, *file.get("inner", [])]
-        require(len(files) == len(designs), "the file has other members")
-        for design, one in zip(designs, files):
-            require(same({k: v for k, v in design.line.items() if k not in added}, one), "the file has another design")
+    if "model" not in file:
+        added, files = ("design", "inner_of", "pieces", "joined"), [file, *file.get("inner", [])]
+        mine = [{key: value for key, value in design.line.items() if key not in added} for design in designs]
+        require(same(mine, files), "the file has another design")
         return
-    for design in designs if len(designs) == 1 else []:
-        line, each = design.line, lambda value: value if isinstance(value[0][0], list) else [value]
-        pairs = [(line["A"], file["model"]["A"]), (line["B"], file["model"]["B"])]
-        pairs += [(line[key], file[key]) for key in "KFYL" if line.get(key) is not None]
-        pairs += [([line["P"]], file["P"])] if design.common else []
+    for k, design in enumerate(designs):  # one polytope, or one for each vertex
+        pairs = [(design.line[key], file["model"][key]) for key in "AB"] + [(design.line["weights"], file.get("weights"))]
+        pairs += [(design.line[key], file.get(key)) for key in "KFYL" if design.line.get(key) is not None]
+        pairs += [([design.line["P"]], file["P"])] if design.common else []
         for mine, given in pairs:
-            given = each(given)
-            require(all(same(matrix, given[i % len(given)]) for i, matrix in enumerate(mine)), "the file has another design")
-
+            if isinstance(given, dict):
+                mine, given = [mine["q"], mine["r"]], [given["Q"], given["R"]]
+            each = given if given is None or isinstance(given[0][0], list) else [given]
+            first = k if len(designs) > 1 else 0
+            require(mine is each or all(same(x, each[(first + i) % len(each)]) for i, x in enumerate(mine)), "the file has another design")
 
 WORK = {}
 
 
-def work(task):
-    """One task of a claim; an empty string if it is proved. (Balls are not sent between processes.)"""
-    designs, tasks = WORK["designs"], WORK["tasks"]
-    claim, group = tasks[task]
-    design = designs[claim["design"]]
+def work(index):
+    """Why a task is not proved, or nothing. (Balls are not sent between processes; they are inherited.)"""
+    claim, group, floor = WORK["tasks"][index]
+    design = WORK["designs"][claim["design"]]
     try:
-        if group is None:
-            done = all(is_definite(m.entries(), m.nrows()) for m in design.matrices(claim))
-        else:
-            done = prove_group(design, claim, group)
-    except (Refused, KeyError, IndexError, TypeError, ValueError, ZeroDivisionError) as error:
-        return f"claim {claim['claim']}: {error}"
+        is_proved = prove_group(design, claim, group, floor) if group else all(
+            is_definite(m.entries(), m.nrows()) for m in design.matrices(claim))
+    except Exception as error:
+        return f"claim {claim['claim']}: {error!r}"
     where = f" on piece {group['piece']}" if group else ""
-    return "" if done else f"claim {claim['claim']}: {statement(claim, design)}: not proved{where}"
+    return "" if is_proved else f"claim {claim['claim']} ({statement(claim)}) is not proved{where}"
 
 
 def check(path, file=None, jobs=2):
-    """The statements of a record that holds.
-
-    Raises [Refused] with the reason if it does not.
-    """
-    designs, claims = read(path)
-    designs = [Polytope(line) if "polytope" in line else Design(line) for line in designs]
+    """The claims of a record, all of which hold; else an exception says what does not."""
+    lines, claims = read(path)
+    designs, tasks = [Polytope(line) if "polytope" in line else Design(line) for line in lines], []
     if file is not None:
         check_file(designs, file)
-    tasks = []
     for claim in claims:
         design = designs[claim["design"]]
         if claim["kind"] == "motion":
             check_motion(designs, claims, claim)
             for number, bound in zip(claim["premises"], claim["bounds"]):
-                definite = claims[claims[number]["premises"][0]]
-                tasks += [({**definite, "floor": bound["y"], "claim": claim["claim"]}, g) for g in definite["groups"]]
+                premise = claims[claims[number]["premises"][0]]
+                tasks += [(premise, group, bound["y"]) for group in premise["groups"]]
             continue
-        premises_hold(claims, claim, design)
-        if isinstance(design, Polytope):
-            tasks.append((claim, None))
-        else:
+        check_premises(claims, claim, design)
+        if isinstance(design, Design):
             check_cells(design, claim)
-            tasks += [(claim, group) for group in claim["groups"]]
+        tasks += [(claim, group, 0.0) for group in (claim["groups"] if isinstance(design, Design) else [None])]
     WORK.update(designs=designs, tasks=tasks)
-    with multiprocessing.get_context("fork").Pool(jobs) as pool:
-        for failure in pool.imap_unordered(work, range(len(tasks)), 4):
+    if jobs == 1:
+        for failure in map(work, range(len(tasks))):
             require(not failure, failure)
-    return [statement(claim, designs[claim["design"]]) for claim in claims]
+        return [statement(claim) for claim in claims]
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
+        for failure in pool.map(work, range(len(tasks)), chunksize=4):
+            if failure:
+                pool.shutdown(cancel_futures=True)
+                raise Refused(failure)
+    return [statement(claim) for claim in claims]
 
 
 def main():
@@ -876,12 +763,10 @@ def main():
     arguments = parser.parse_args()
     try:
         statements = check(arguments.record, arguments.design, arguments.jobs)
-    except (Refused, KeyError, IndexError, TypeError, ValueError, AttributeError, ZeroDivisionError) as error:
+    except Exception as error:  # whatever a record breaks, it is not proved
         print(f"refused: {error if isinstance(error, Refused) else repr(error)}")
         return 1
-    for text in statements:
-        print(f"holds: {text}")
-    print(f"accepted: {len(statements)} claims")
+    print(*(f"holds: {text}" for text in statements), f"accepted: {len(statements)} claims", sep="\n")
     return 0
 
 
