@@ -72,9 +72,10 @@ def read(path):
     """Designs and claims of a record."""
     with open(path, "rb") as file:
         head, _, body = file.read().partition(b"\n")
-    head, lines = load(head), [load(line) for line in body.splitlines()]
-    require(head["format"] == FORMAT and head["lines"] == len(lines), "lines are missing, or of another format")
+    head = load(head)
     require(hashlib.sha256(body).hexdigest() == head["sha256"], "the digest is not that of the record")
+    lines = [load(line) for line in body.splitlines()]
+    require(head["format"] == FORMAT and head["lines"] == len(lines), "lines are missing, or of another format")
     designs, claims = ([line for line in lines if ("claim" in line) == is_claim] for is_claim in (False, True))
     require(lines == designs + claims and claims, "designs come first, then claims")
     for number, line in enumerate(designs):
@@ -357,7 +358,8 @@ class Design:
     def check_schedule(self, schedule):
         """Knots are where they should be, and gains at knots those of the points."""
         self.gain, gains, rhos = schedule, [p["gain"] for p in self.points], [p["rho"] for p in self.points]
-        for k, rho in enumerate(rhos if self.parameter is not None else []):
+        require(self.parameter is not None or rhos == [0.0], "there is no parameter")
+        for k, rho in enumerate(rhos):
             off = arb(rho) - self.low - 2 * arb.pi() * k / len(rhos)
             require(off.abs_upper() < 1e-12, "a grid point is not where it should be")
         if schedule["kind"] == "grid":
@@ -508,7 +510,10 @@ class Polytope:
         self.lyapunov = all_of(given, self.n, self.n)
         self.gain = all_of(line["K" if self.common else "L"], self.m, self.n)
         self.rates = [[0.0] * self.count] if self.common else line["rate_vertices"]
-        require(self.rates and all(len(rates) == self.count for rates in self.rates), "rate vertices are wrong")
+        for rates in self.rates:
+            off = sum(map(Fraction, rates))
+            require(len(rates) == self.count and abs(off) <= 1e-9 * max(map(abs, rates)), "rates do not sum to zero")
+        require(self.rates, "rate vertices are missing")
         if line["weights"]:
             self.q, self.r = map(arb_mat, check_weights(line["weights"], self.n, self.m))
         self.sigma = line["sigma"] or [None] * self.m
@@ -565,8 +570,9 @@ def check_premises(claims, claim, design):
     if kind not in ("definite", "sampled"):
         require(claim["level"] > 0 if limited else claim["level"] is None, "it needs a level, or none")
         require(all(p["level"] == claim["level"] for p in premises[1:]), "a premise is about another level")
-    require(kind != "cost" or claim["factor"] >= 1, "the factor is below one")
+    require(kind != "cost" or claim["factor"] > 0, "the factor is not positive")
     if kind in ("decrease", "cost") and isinstance(design, Design):
+        require(design.parameter is not None or claim["rate"] == 0, "there is no parameter that moves")
         require(claim["rate"] >= 0 and (kind != "cost" or premises[-1]["rate"] >= claim["rate"]), "the rate is wrong")
     require(kind != "sampled" or claim["sample_time_s"] == design.line["sample_time_s"] > 0, "the sample time is wrong")
 
@@ -625,6 +631,7 @@ def check_motion(designs, claims, claim):
     governor = supervisor["governor"]
     motion, states, rate = governor["motion"], governor["set_point_states"], governor["motion"]["parameter_rate"]
     require([(p["kind"], p["design"]) for p in premises] == [("cost", m.line["design"]) for m in members], "a member's cost is missing")
+    require(governor["operating_state"] == [0.0] * outer.n, "the reference does not rest where the plant does")
     inner = [member.line["controller"]["schedule"] for member in members[1:]]
     require([member["schedule"] for member in supervisor["inner"]] == inner, "inner gains differ from those that fly")
     for member, premise in zip(members, premises):

@@ -32,8 +32,9 @@ const EIGENVALUE_SHARE: f64 = 0.5;
 const EIGENVALUE_SAMPLES: usize = 128;
 /// Keys of a design at a grid point, and of a whole one, that the theorems speak of.
 const POINT_KEYS: [&str; 4] = ["rho", "gain", "auxiliary_gain", "p"];
-const DESIGN_KEYS: [&str; 9] =
-    ["name", "convention", "plant", "method", "weights", "sample_time_s", "controller", "points", "rate_bounded"];
+const DESIGN_KEYS: [&str; 8] =
+    ["name", "convention", "plant", "weights", "sample_time_s", "controller", "points", "rate_bounded"];
+const GOVERNOR_KEYS: [&str; 4] = ["set_point_states", "operating_state", "parameter_rate", "motion"];
 
 /// Why there is no record.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -249,6 +250,11 @@ fn object(value: Value) -> Map<String, Value> {
     }
 }
 
+/// The entries with these keys.
+fn picked(value: Value, keys: &[&str]) -> Map<String, Value> {
+    object(value).into_iter().filter(|(key, _)| keys.contains(&key.as_str())).collect()
+}
+
 fn plain(value: impl Serialize) -> Result<Value, RecordError> {
     serde_json::to_value(value).map_err(|error| RecordError::Unwritable(error.to_string()))
 }
@@ -281,15 +287,21 @@ fn hexadecimal(x: f64) -> String {
 
 /// The data of a design that its claims are about; P(ρ) of a frozen one as it was joined.
 fn of_design(design: &Design, closed_loop: &ClosedLoop) -> Result<Map<String, Value>, RecordError> {
-    let mut whole = object(plain(design)?);
-    let mut value: Map<String, Value> =
-        DESIGN_KEYS.iter().filter_map(|&key| Some((key.to_owned(), whole.remove(key)?))).collect();
+    let mut value = picked(plain(design)?, &DESIGN_KEYS);
     if let Some(Value::Array(points)) = value.get_mut("points") {
-        for point in points {
-            *point = Value::Object(
-                object(point.take()).into_iter().filter(|(key, _)| POINT_KEYS.contains(&key.as_str())).collect(),
-            );
+        points.iter_mut().for_each(|point| *point = Value::Object(picked(point.take(), &POINT_KEYS)));
+    }
+    // of a family and a governor, what flies and how references move
+    if let Some(supervisor) = value.get_mut("controller").and_then(|controller| controller.get_mut("supervisor"))
+        && supervisor.is_object()
+    {
+        if let Some(Value::Array(inner)) = supervisor.get_mut("inner") {
+            inner.iter_mut().for_each(|member| *member = Value::Object(picked(member.take(), &["schedule"])));
         }
+        if let Some(governor) = supervisor.get_mut("governor").filter(|governor| governor.is_object()) {
+            *governor = Value::Object(picked(governor.take(), &GOVERNOR_KEYS));
+        }
+        *supervisor = Value::Object(picked(supervisor.take(), &["inner", "governor"]));
     }
     if let (Form::Direct(p), true) = (&closed_loop.form, closed_loop.has_parameter) {
         value.insert("joined".into(), json!({"p": plain(p)?, "auxiliary": plain(&closed_loop.auxiliary)?}));
