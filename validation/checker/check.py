@@ -327,7 +327,7 @@ class Design:
         require(controller["scheduling_state"] == self.parameter, "the scheduling state is not that of the plant")
         self.q, self.r = check_weights(line["weights"], self.n, self.m)
         self.sigma = [self.room(controller["limits"], i) for i in range(self.m)]
-        require(all(sigma is None or sigma > 0 for sigma in self.sigma), "an input has no room")
+        require(all(sigma is None or sigma >= 0 for sigma in self.sigma), "an input rests beyond its limits")
         # ρ = -π + ω t, t from 0 to the number of pieces, once around the circle
         require(0 < self.pieces <= 4096 if turns else self.pieces == len(self.points) == 1, "pieces are wrong")
         self.low, self.omega = (arb(-math.pi), 2 * arb.pi() / self.pieces) if turns else (arb(0), arb(0))
@@ -347,6 +347,7 @@ class Design:
         self.saturating = [i for i in range(self.m) if self.low_gain and self.sigma[i] is not None]
         low = [self.gains(piece)[1] for piece in range(self.pieces)]
         self.limited = [i for i in range(self.m) if self.sigma[i] is not None and any(k.rows([i]).terms for k in low)]
+        require(all(self.sigma[i] > 0 for i in self.limited), "an input that moves has no room")
         self.check_points()
 
     def room(self, limits, i):

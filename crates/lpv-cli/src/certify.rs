@@ -8,7 +8,10 @@ use crate::output::print;
 use crate::scenario::door::Door;
 use crate::scenario::read_text;
 use clap::Args;
-use lpv::certificate::{Claim, ProofOptions, Record, RecordError, Verdict, Witness, check, prove_supervised};
+use lpv::certificate::{
+    Claim, ClaimKind, Member, Of, ProofOptions, Record, RecordError, Verdict, Words, check, merged, prove_supervised,
+    worst,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -38,26 +41,8 @@ pub struct CertifyArguments {
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Certificate<'a> {
-    claims: Vec<ClaimLine<'a>>,
-}
-
-#[derive(Serialize)]
-struct ClaimLine<'a> {
-    claim: &'a str,
     verdict: Verdict,
-    /// Null where there is none.
-    margin: f64,
-    witness: Option<&'a Witness>,
-    cells: usize,
-    seconds: f64,
-}
-
-impl<'a> ClaimLine<'a> {
-    fn new(claim: &'a Claim) -> Self {
-        let Claim { claim, verdict, margin, witness, cells, seconds, .. } = claim;
-        let witness = witness.as_ref();
-        Self { claim, verdict: *verdict, margin: *margin, witness, cells: *cells, seconds: *seconds }
-    }
+    claims: &'a [Claim],
 }
 
 /// Check the design; anything worse than `numerical` is a failure.
@@ -90,38 +75,42 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
         let claims = polytopic::claims(&door, &text, arguments.region, &mut record)?;
         write(arguments, &record)?;
         let name = arguments.design.file_stem().map_or("design".into(), |name| name.to_string_lossy().into_owned());
-        return finish(arguments, &name, designs::worst(&claims), &claims);
+        return finish(arguments, &name, worst(&claims), &claims);
     }
     let design = designs::from_json(&arguments.design, &text)?;
     let plant = design
         .plant
         .build()
         .map_err(|error| Failure::Unreadable { file: arguments.design.clone(), message: error.to_string() })?;
-    let mut claims = check(&design, &*plant);
-    for inner in &design.inner {
-        claims.extend(designs::named_of_inner(inner, check(inner, &*plant)));
+    let mut checked = check(&design, &*plant);
+    for (k, inner) in design.inner.iter().enumerate() {
+        checked.extend(check(inner, &*plant).into_iter().map(|claim| claim.of_member(Member::Inner(k))));
     }
-    let mut verdict = designs::worst(&claims);
     let options = ProofOptions { rate: arguments.rate, level: arguments.region, nonlinear: arguments.nonlinear };
-    match prove_supervised(&design, &*plant, &options) {
+    let (claims, verdict) = match prove_supervised(&design, &*plant, &options) {
         Ok(proofs) => {
             if arguments.record.is_some() {
                 let mut record = Record::default();
                 record.add_design(&design, &*plant, &proofs).map_err(|error| unwritten(arguments, &error))?;
                 write(arguments, &record)?;
             }
-            // the rates found for a frozen design are a finding, not a claim that it makes
-            let asked = proofs.members[0].asked;
-            let counted = |claim: &&Claim| asked || claim.verdict == Verdict::Refuted;
-            verdict = proofs.claims.iter().filter(counted).map(|claim| claim.verdict).fold(verdict, Verdict::min);
-            claims.extend(proofs.claims);
+            let claims = merged(checked, proofs.claims.clone());
+            // what is looked for beyond the design's own claims counts only if it is decided
+            let found: Vec<Claim> =
+                proofs.claims.iter().filter(|claim| !proofs.members[0].is_counted(claim)).cloned().collect();
+            let is_found = |claim: &&Claim| found.iter().any(|other| other.id == claim.id);
+            let counted = claims.iter().filter(|claim| !is_found(claim));
+            let verdict = counted.map(|claim| claim.verdict).min().unwrap_or(Verdict::Undecided);
+            (claims, verdict)
         }
-        Err(reason) if arguments.rate.is_some() || arguments.region.is_some() => {
-            verdict = verdict.min(Verdict::Undecided);
-            claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string()));
+        Err(reason) => {
+            let asked = arguments.rate.is_some() || arguments.region.is_some();
+            let verdict = if asked { Verdict::Undecided } else { worst(&checked) };
+            let provable = Claim::new(ClaimKind::Provable, Of::Model, &Words::default());
+            checked.push(provable.decided(Verdict::Undecided, f64::NAN, reason.to_string()));
+            (checked, verdict)
         }
-        Err(reason) => claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string())),
-    }
+    };
     finish(arguments, &design.name, verdict, &claims)
 }
 
@@ -141,7 +130,7 @@ fn unwritten(arguments: &CertifyArguments, error: &RecordError) -> Failure {
 /// Print the claims; exit as the verdict asks.
 fn finish(arguments: &CertifyArguments, name: &str, verdict: Verdict, claims: &[Claim]) -> Result<(), Failure> {
     if arguments.json {
-        let certificate = Certificate { claims: claims.iter().map(ClaimLine::new).collect() };
+        let certificate = Certificate { verdict, claims };
         let json = serde_json::to_string_pretty(&certificate).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;
     } else {

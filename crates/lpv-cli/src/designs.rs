@@ -4,7 +4,10 @@ use crate::failure::Failure;
 use crate::folder::ResultFolder;
 use crate::progress;
 use crate::scenario::{ControllerPlan, Scenario, engineers_words};
-use lpv::certificate::{Claim, ProofOptions, Proofs, SupervisedProofs, Verdict, check, prove, prove_supervised};
+use lpv::certificate::{
+    Claim, ClaimKind, Member, Of, ProofOptions, Proofs, SupervisedProofs, Verdict, Words, check, merged, prove,
+    prove_supervised, worst,
+};
 use lpv::synthesis::{Design, SynthesisError, design_supervised};
 use serde::Serialize;
 use std::time::Instant;
@@ -15,7 +18,7 @@ pub struct CheckedDesign {
     pub design: Design,
     /// Claims about it that need no flight.
     pub claims: Vec<Claim>,
-    /// What is proved of a supervised design; `None` of others, which `lpv certify` proves.
+    /// What is proved of a design that is supervised or required to be proved; `None` of others, which `lpv certify` proves.
     pub proofs: Option<SupervisedProofs>,
     /// Seconds that synthesis took; zero where a design was shared.
     pub design_seconds: f64,
@@ -65,16 +68,12 @@ pub struct DesignSummary<'a> {
     claims: &'a [Claim],
 }
 
-/// The worst verdict of some claims; `undecided` for none.
-pub fn worst(claims: &[Claim]) -> Verdict {
-    claims.iter().map(|claim| claim.verdict).min().unwrap_or(Verdict::Undecided)
-}
-
 /// The verdict on the design called `label` and the claims about it, as text, a line each.
 pub fn text(label: &str, verdict: Verdict, claims: &[Claim]) -> String {
     let mut text = format!("{label}: {}\n", verdict.word());
     for claim in claims {
-        text.push_str(&format!("  {}: {} ({})\n", claim.verdict.word(), claim.claim, claim.detail));
+        let detail = if claim.detail.is_empty() { String::new() } else { format!(" ({})", claim.detail) };
+        text.push_str(&format!("  {}: {}{detail}\n", claim.verdict.word(), claim.claim));
     }
     text
 }
@@ -115,10 +114,11 @@ pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign]) -> Vec<Opti
         let proofs = prove(&checked.design, &*scenario.plant, &ProofOptions::default()).ok();
         bar.inc(1);
         let told = |proofs: &Proofs| {
-            let is_told = |claim: &&Claim| proofs.asked || claim.verdict == Verdict::Proved;
-            proofs.claims.iter().filter(is_told).cloned().collect::<Vec<Claim>>()
+            proofs.claims.iter().filter(|claim| proofs.is_counted(claim)).cloned().collect::<Vec<Claim>>()
         };
-        checked.claims.extend(proofs.iter().flat_map(told));
+        if let Some(proofs) = &proofs {
+            checked.claims = merged(std::mem::take(&mut checked.claims), told(proofs));
+        }
         proofs
     };
     let proofs = checked.iter_mut().map(prove_one).collect();
@@ -126,12 +126,14 @@ pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign]) -> Vec<Opti
     proofs
 }
 
-fn same_but_name(a: &ControllerPlan, b: &ControllerPlan) -> bool {
-    let (supervisions, a, b) = (a.supervision == b.supervision, &a.request, &b.request);
+fn same_but_name(a_plan: &ControllerPlan, b_plan: &ControllerPlan) -> bool {
+    let supervisions = a_plan.supervision == b_plan.supervision;
+    let (a, b) = (&a_plan.request, &b_plan.request);
     // all requests of a scenario share plant, weights, grid and sample time
     let requests =
         a.method == b.method && a.schedule == b.schedule && a.limits == b.limits && a.rate_bounded == b.rate_bounded;
-    requests && supervisions
+    // one that is to be proved is proved once, too
+    requests && supervisions && a_plan.require == b_plan.require
 }
 
 fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesign, SynthesisError> {
@@ -145,32 +147,26 @@ fn design_one(scenario: &Scenario, plan: &ControllerPlan) -> Result<CheckedDesig
     bar.set_message(format!("check {}", request.name));
     let started = Instant::now();
     let mut claims = check(&design, &*scenario.plant);
-    for inner in &design.inner {
-        claims.extend(named_of_inner(inner, check(inner, &*scenario.plant)));
+    for (k, inner) in design.inner.iter().enumerate() {
+        let of_inner = check(inner, &*scenario.plant).into_iter().map(|claim| claim.of_member(Member::Inner(k)));
+        claims.extend(of_inner);
     }
     let mut proofs = None;
-    if design.controller.supervisor.is_some() {
+    if design.controller.supervisor.is_some() || plan.require == Some(Verdict::Proved) {
         bar.set_message(format!("prove {}", request.name));
         match prove_supervised(&design, &*scenario.plant, &ProofOptions::default()) {
             Ok(found) => {
-                claims.extend(found.claims.clone());
+                claims = merged(claims, found.claims.clone());
                 proofs = Some(found);
             }
             Err(reason) => {
-                claims.push(Claim::checked("proof", Verdict::Undecided, f64::NAN, reason.to_string()));
+                let provable = Claim::new(ClaimKind::Provable, Of::Model, &Words::default());
+                claims.push(provable.decided(Verdict::Undecided, f64::NAN, reason.to_string()));
             }
         }
     }
     bar.finish_and_clear();
     Ok(CheckedDesign { design, claims, proofs, design_seconds, check_seconds: started.elapsed().as_secs_f64() })
-}
-
-/// Claims about a member of a family, with its level.
-pub fn named_of_inner(inner: &Design, claims: Vec<Claim>) -> impl Iterator<Item = Claim> {
-    let level = inner.method.gamma().unwrap_or(f64::NAN);
-    claims
-        .into_iter()
-        .map(move |claim| Claim { claim: format!("inner set of level {level}: {}", claim.claim), ..claim })
 }
 
 /// Write the LPV model and the designs on it.

@@ -3,8 +3,8 @@
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::{StepStay, step_stays};
 use lpv::certificate::{
-    Claim, Excursion, Proofs, StepBound, StepConditions, SupervisedProofs, UnmetCondition, Verdict, excursion,
-    lyapunov_value, step_bound,
+    Claim, ClaimKind, Excursion, Of, Proofs, StepBound, StepConditions, SupervisedProofs, UnmetCondition, Verdict,
+    Words, excursion, lyapunov_value, step_bound,
 };
 use lpv::model::linearize;
 use lpv::sim::{Flight, Performance, Simulation, StepResponse, Trajectory, performance};
@@ -122,8 +122,8 @@ fn step_bounds(
         });
         let end = performance.steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
         let beyond = excursions(scenario, design, trajectory, [step.time_s, end], bound.level);
-        let claim = Claim::checked(
-            format!("step {} at t = {} s costs at most {}", k + 1, step.time_s, digits(bound.bound)),
+        let kind = ClaimKind::StepCost { step: k + 1, time_s: step.time_s, bound: bound.bound };
+        let claim = Claim::new(kind, Of::Model, &Words::default()).decided(
             bound.verdict(),
             bound.level.map_or(f64::INFINITY, |level| level - bound.bound),
             inside + &others.collect::<String>() + &beyond,
@@ -193,7 +193,7 @@ pub fn compare_with_proofs(scenario: &Scenario, flown: &mut Flown, proofs: &Proo
     let stride = ((EXCURSION_STEP_S / scenario.sample_time_s) as usize).max(1);
     let all: Vec<usize> = (0..trajectory.time_s.len()).step_by(stride).collect();
     let peak = flown.performance.steps.iter().map(|step| step.peak_parameter_rate).fold(0.0, f64::max);
-    let claim = format!("{parameter} keeps to the rate for which V is proved to decrease");
+    let kind = ClaimKind::RateKept { parameter: parameter.clone() };
     let (verdict, margin, detail) = match proofs.stable_up_to {
         None => (Verdict::Undecided, f64::NAN, format!("none is proved; it moved at up to {peak:.4} {unit}/s")),
         Some(rate) => {
@@ -211,15 +211,16 @@ pub fn compare_with_proofs(scenario: &Scenario, flown: &mut Flown, proofs: &Proo
             }
         }
     };
-    flown.claims.push(Claim::checked(claim, verdict, margin, detail));
+    flown.claims.push(Claim::new(kind, Of::Plant, &Words::default()).decided(verdict, margin, detail));
 }
 
 /// Which γ would cover the step. It is advice: a trial design that fails takes nothing from the flight.
 fn cover(scenario: &Scenario, design: &Design, step: &StepResponse, level: f64) -> String {
     let controller = &design.controller;
-    let Some(sigma) = controller.limits.symmetric_bound(&controller.operating_input) else {
+    let sigma = controller.limits.symmetric_bound(&controller.operating_input);
+    if !sigma.iter().all(|sigma| sigma.is_finite()) {
         return String::new();
-    };
+    }
     let from = design.method.gamma().unwrap_or(level);
     let model = linearize(&*scenario.plant, step.parameter);
     match covering_level(&model, &design.weights, &sigma, &step.error, from) {

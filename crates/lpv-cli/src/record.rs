@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::scenario::Scenario;
 use crate::stay::StepStay;
-use lpv::certificate::{Claim, StepBound, Verdict};
+use lpv::certificate::{Claim, StepBound, Verdict, worst};
 use lpv::estimator::Consistency;
 use lpv::sim::{Outcome, Performance};
 use lpv::synthesis::Method;
@@ -174,5 +174,5 @@ impl<'a> RunRecord<'a> {
 
 /// The verdict on the cost bound of a flight: the worst of the design's claims and the flight's.
 pub fn bound_verdict(checked: &CheckedDesign, flown: &Flown) -> Verdict {
-    checked.verdict().min(crate::designs::worst(&flown.claims))
+    checked.verdict().min(worst(&flown.claims))
 }

@@ -31,7 +31,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let scenario = Scenario::read(&arguments.scenario)?;
     let folder = ResultFolder::begin(&scenario.result_folder(arguments.output.out.as_deref()), arguments.output.force)?;
     let mut checked = designs::design_all(&scenario)?;
-    let proofs = if arguments.prove { designs::prove_all(&scenario, &mut checked) } else { Vec::new() };
+    let proofs = match arguments.prove {
+        true => designs::prove_all(&scenario, &mut checked),
+        false => checked.iter().map(|checked| Some(checked.proofs.as_ref()?.members[0].clone())).collect(),
+    };
     let certified: Vec<_> = checked.iter().map(|checked| (&checked.design, checked.proofs.as_ref())).collect();
     let mut flown = flights::fly_all(&scenario, &certified);
     for (flown, proofs) in flown.iter_mut().zip(&proofs) {

@@ -2,7 +2,7 @@
 //! proved about them?
 
 use crate::scenario::{ControllerPlan, Scenario};
-use lpv::certificate::{Claim, SupervisedProofs, Verdict};
+use lpv::certificate::{Claim, ClaimKind, Of, SupervisedProofs, Verdict, Words};
 use lpv::math::angle::wrap;
 use lpv::sim::{Flight, Performance, SetStay, set_stay};
 use lpv::synthesis::Design;
@@ -81,8 +81,8 @@ pub fn step_stays(
         };
         let verdict = if reasons.is_empty() { Verdict::Proved } else { Verdict::Undecided };
         let reasons: String = reasons.iter().map(|reason| format!("; {reason}")).collect();
-        let claim = Claim::checked(
-            format!("step {} at t = {} s stays in the certified set", k + 1, response.time_s),
+        let kind = ClaimKind::StepStays { step: k + 1, time_s: response.time_s };
+        let claim = Claim::new(kind, Of::Model, &Words::default()).decided(
             verdict,
             1.0 - stay.peak_share,
             peak + &motion + &reasons,

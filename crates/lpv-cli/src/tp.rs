@@ -8,6 +8,7 @@ use crate::folder::ResultFile;
 use crate::output::{OutputArguments, print};
 use crate::scenario::read_text;
 use clap::Args;
+use lpv::math::decimal::{at_most, fixed};
 use lpv::math::matrix::to_rows;
 use lpv::model::tensor_product::{Accuracy, HullQuality, TensorProductError, TensorProductModel, Weighting};
 use model::TransformationPlan;
@@ -130,7 +131,7 @@ fn record<'a>(plan: &'a TransformationPlan, model: &'a TensorProductModel, secon
 const SHOWN: usize = 8;
 
 fn text(record: &TpRecord) -> String {
-    let numbers = |values: &[f64]| values.iter().map(|value| format!("{value:.4}")).collect::<Vec<_>>().join(" ");
+    let numbers = |values: &[f64]| values.iter().map(|value| fixed(*value, 4)).collect::<Vec<_>>().join(" ");
     let mut text = format!("model            {}, {} x {}\n", record.model, record.size[0], record.size[1]);
     if let Some(source) = record.source {
         text += &format!("source           {source}\n");
@@ -142,7 +143,7 @@ fn text(record: &TpRecord) -> String {
         let more = if parameter.singular_values.len() > SHOWN { " …" } else { "" };
         let hull = parameter.hull;
         text += &format!(
-            "\nparameter        {} [{}], {} points over [{:.6}, {:.6}]\nsingular values  {}{more}\nkept             {}\nweights          {} {}\n  least          {}\n  largest        {}\n  sum error      {:.1e}\n  volume ratio   {:.6}\n",
+            "\nparameter        {} [{}], {} points over [{:.6}, {:.6}]\nsingular values  {}{more}\nkept             {}\nweights          {} {}\n  least          {}\n  largest        {}\n  sum error      {}\n  volume ratio   {:.6}\n",
             parameter.name,
             parameter.unit,
             grid.len(),
@@ -154,20 +155,24 @@ fn text(record: &TpRecord) -> String {
             kind_name(parameter.weighting),
             numbers(&hull.minima),
             numbers(&hull.maxima),
-            hull.sum_error,
+            at_most(hull.sum_error),
             hull.volume_ratio,
         );
     }
     text += &format!("\nvertices         {}\n", record.vertices.len());
     let accuracy = record.accuracy;
     text += &format!(
-        "error            {:.3e} largest at the grid points; norm {:.3e}, bound {:.3e}\n",
-        accuracy.grid_max, accuracy.grid_norm, accuracy.bound
+        "error            {} largest at the grid points; norm {}, bound {}\n",
+        at_most(accuracy.grid_max),
+        at_most(accuracy.grid_norm),
+        at_most(accuracy.bound)
     );
     if accuracy.between_points > 0 {
         text += &format!(
-            "between them     {:.3e} largest, {:.3e} rms at {} points\n",
-            accuracy.between_max, accuracy.between_rms, accuracy.between_points
+            "between them     {} largest, {} rms at {} points\n",
+            at_most(accuracy.between_max),
+            at_most(accuracy.between_rms),
+            accuracy.between_points
         );
     }
     text += "depends\n";

@@ -4,9 +4,11 @@
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::engineers_words;
-use lpv::certificate::{Claim, PolytopicClaim, PolytopicLyapunov, Record, RecordError, prove_polytopic};
+use lpv::certificate::{Claim, Member, PolytopicClaim, PolytopicLyapunov, Record, RecordError, prove_polytopic};
 use lpv::math::Mat;
-use lpv::math::matrix::{from_rows, inverse_spd, is_finite, is_symmetric};
+use lpv::math::decimal::about;
+use lpv::math::definite::{Definiteness, asymmetry, definiteness, smallest_eigenvalue_about};
+use lpv::math::matrix::{from_rows, identity, is_finite};
 use lpv::model::Polytope;
 use lpv::synthesis::CostWeights;
 use lpv::synthesis::polytopic::InputBounds;
@@ -15,7 +17,9 @@ use serde::Deserialize;
 type Rows = Vec<Vec<f64>>;
 /// Inputs of a high-gain design: there are 2^m mixtures.
 const MOST_HIGH_GAIN_INPUTS: usize = 10;
-/// Relative difference up to which a matrix is symmetric, and rates sum to zero.
+/// Relative difference of what a file says twice: inverses are no better.
+const REPEATED: f64 = 1e-6;
+/// Relative size of what the sum of a rate vertex may be.
 const TOLERANCE: f64 = 1e-9;
 
 /// The keys that a certificate reads; others, of the answer of `lpv design`, are let be.
@@ -25,7 +29,8 @@ struct PolytopicFile {
     model: ModelTable,
     model_hash: Option<String>,
     weights: Option<WeightsTable>,
-    sigma: Option<Vec<f64>>,
+    /// Null where an input is not limited.
+    sigma: Option<Vec<Option<f64>>>,
     gamma: Option<f64>,
     rate_vertices: Option<Vec<Vec<f64>>>,
     #[serde(rename = "K")]
@@ -115,9 +120,9 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
             ),
         }
     };
-    let symmetric = |key: &str, each: &[Mat<f64>]| match each.iter().position(|m| !is_symmetric(m, TOLERANCE)) {
-        None => Ok(()),
-        Some(at) => door.refuse(format!("{key}[{}]", at + 1), "has to be symmetric"),
+    let symmetric = |key: &str, each: &[Mat<f64>]| {
+        let numbered = |at: usize| if each.len() > 1 { format!("{key}[{}]", at + 1) } else { key.to_owned() };
+        each.iter().enumerate().try_for_each(|(at, matrix)| symmetric(door, &numbered(at), matrix))
     };
     let needed = |key: &str, given: Option<Vec<Mat<f64>>>| {
         given.map_or_else(|| door.refuse(key, "is missing: without it there is nothing to certify"), Ok)
@@ -133,6 +138,12 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
     }
     let p = sized("P", &file.p, [n, n])?;
     let same = p.as_ref().is_some_and(|p| p.iter().all(|other| *other == p[0]));
+    let repeated =
+        [("K", sized("K", &file.k, [m, n])?), ("L", sized("L", &file.l, [m, n])?), ("Y", sized("Y", &file.y, [n, n])?)];
+    let [k, l, y] = &repeated;
+    agree(door, "L", &l.1, &[&k.1, &y.1])?;
+    let identity = || vec![identity(n); count];
+    agree(door, "Y", &y.1.as_ref().and(p.as_ref()).map(|_| identity()), &[&p, &y.1])?;
     let kind = match (file.lyapunov, &file.rate_vertices) {
         (Some(kind), _) => kind,
         (None, Some(_)) => Kind::ParameterDependent,
@@ -176,9 +187,7 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
                 let model = Polytope::hull(&[polytope.vertex(i)]);
                 let lyapunov = PolytopicLyapunov::Common { p: p[i].clone(), gain: vec![gain[i].clone()] };
                 let claims = proved(claim(model, lyapunov, auxiliary_gain.as_ref().map(|f| vec![f[i].clone()])))?;
-                let place =
-                    if count > 1 { format!(", at point {} with the parameter at rest", i + 1) } else { String::new() };
-                let named = |claim: Claim| Claim { claim: format!("{}{place}", claim.claim), ..claim };
+                let named = |claim: Claim| if count > 1 { claim.of_member(Member::Point(i)) } else { claim };
                 Ok(claims.into_iter().map(named).collect::<Vec<Claim>>())
             };
             let each: Vec<Vec<Claim>> = (0..count).map(&mut at).collect::<Result<_, Failure>>()?;
@@ -211,17 +220,54 @@ fn matrix(door: &Door, key: &str, rows: &Rows) -> Result<Mat<f64>, Failure> {
     Ok(matrix)
 }
 
+/// What a file says twice is the same: `product` is that of `factors` at every vertex, as far as printed digits go.
+fn agree(
+    door: &Door,
+    key: &str,
+    product: &Option<Vec<Mat<f64>>>,
+    factors: &[&Option<Vec<Mat<f64>>>; 2],
+) -> Result<(), Failure> {
+    let (Some(product), [Some(left), Some(right)]) = (product, factors) else { return Ok(()) };
+    for (at, ((product, left), right)) in product.iter().zip(left).zip(right).enumerate() {
+        let size = product.norm_max().max(left.norm_max() * right.norm_max());
+        if (left * right - product).norm_max() > REPEATED * size {
+            let message = "does not agree with the file's other matrices: L = KY and YP = I at every vertex";
+            return door.refuse(format!("{key}[{}]", at + 1), message);
+        }
+    }
+    Ok(())
+}
+
+/// A proof reads the numbers of the file: they have to be symmetric to the bit.
+fn symmetric(door: &Door, key: &str, matrix: &Mat<f64>) -> Result<(), Failure> {
+    let Some((i, j)) = asymmetry(matrix) else { return Ok(()) };
+    let [(a, b), (c, d)] = [(i + 1, j + 1), (j + 1, i + 1)];
+    let (one, other) = (matrix[(i, j)], matrix[(j, i)]);
+    door.refuse(
+        key,
+        format!("has {one} in row {a}, column {b}, and {other} in row {c}, column {d}: it has to be symmetric, the two the same number to the last digit"),
+    )
+}
+
 fn weights(door: &Door, table: &WeightsTable, n: usize, m: usize) -> Result<CostWeights, Failure> {
     let sized = |key: &str, rows: &Rows, size: usize| {
         let matrix = matrix(door, key, rows)?;
-        match (matrix.nrows(), matrix.ncols()) == (size, size) && is_symmetric(&matrix, TOLERANCE) {
-            true => Ok(matrix),
-            false => door.refuse(key, format!("has to be a symmetric {size} × {size} matrix")),
+        if (matrix.nrows(), matrix.ncols()) != (size, size) {
+            return door.refuse(key, format!("has to be a symmetric {size} × {size} matrix"));
         }
+        symmetric(door, key, &matrix)?;
+        Ok(matrix)
     };
     let (q, r) = (sized("weights.Q", &table.q, n)?, sized("weights.R", &table.r, m)?);
-    if inverse_spd(&r).is_none() {
-        return door.refuse("weights.R", "has to be positive definite");
+    let refuse = |key: &str, matrix: &Mat<f64>, needed: &str| {
+        let eigenvalue = about(smallest_eigenvalue_about(matrix));
+        door.refuse(key, format!("has to be {needed}: its smallest eigenvalue is about {eigenvalue}"))
+    };
+    if !matches!(definiteness(&q), Some(Definiteness::Positive | Definiteness::Semidefinite)) {
+        return refuse("weights.Q", &q, "positive semidefinite");
+    }
+    if definiteness(&r) != Some(Definiteness::Positive) {
+        return refuse("weights.R", &r, "positive definite");
     }
     Ok(CostWeights { q, r })
 }
@@ -243,8 +289,12 @@ fn saturation(
     if sigma.len() != m {
         return door.refuse("sigma", format!("has {} numbers: the model has {m} inputs", sigma.len()));
     }
-    sigma.iter().try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
-    Ok(Some(InputBounds { sigma: sigma.clone(), gamma }))
+    let sigma: Vec<f64> = sigma.iter().map(|bound| bound.unwrap_or(f64::INFINITY)).collect();
+    sigma
+        .iter()
+        .filter(|bound| **bound != f64::INFINITY)
+        .try_for_each(|&bound| door.positive("sigma", bound).map(|_| ()))?;
+    Ok(Some(InputBounds { sigma, gamma }))
 }
 
 fn rates(door: &Door, file: &PolytopicFile, count: usize) -> Result<Vec<Vec<f64>>, Failure> {

@@ -6,6 +6,7 @@ use crate::scenario::door::Door;
 use crate::scenario::file::toml_message;
 use lpv::certificate::{Claim, Verdict, prove_gain};
 use lpv::math::Mat;
+use lpv::math::decimal::about;
 use lpv::math::matrix::{from_rows, is_finite, to_rows};
 use lpv::model::{BasisFunction, MatrixFunction};
 use lpv::synthesis::bounded_real::{GainOptions, InputOutputModel, induced_gain};
@@ -80,9 +81,9 @@ impl GainReport {
     /// The answer as text.
     pub fn text(&self) -> String {
         format!(
-            "status           {}\ngain on the grid {:.6}\n{}: {} ({})\niterations       {} in {:.4} s\n",
+            "status           {}\ngain on the grid {}\n{}: {} ({})\niterations       {} in {:.4} s\n",
             self.status,
-            self.gain,
+            about(self.gain),
             self.verdict.word(),
             self.claim.claim,
             self.claim.detail,

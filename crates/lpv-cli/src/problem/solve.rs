@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use lmi::{Explanation, Outcome, Witness};
 use lpv::certificate::Verdict;
 use lpv::math::Mat;
+use lpv::math::decimal::{Rounding, about, at_least, decimal, fixed};
 use lpv::math::matrix::{quadratic_form, to_rows};
 use lpv::model::{FrozenModel, Polytope};
 use lpv::synthesis::SynthesisError;
@@ -400,27 +401,30 @@ impl Report {
         line("status", self.status.into());
         line("theorem", word(&self.theorem));
         if let Some(objective) = self.objective {
-            line("objective", format!("{objective:.9e}  ({})", self.objective_is));
+            line("objective", format!("{}  ({})", decimal(objective, 10, Rounding::Nearest), self.objective_is));
         }
         if let Some(k) = &self.k {
             for (place, k) in self.places.iter().zip(k) {
                 for (i, row) in k.iter().enumerate() {
-                    let numbers: Vec<String> = row.iter().map(|value| format!("{value:13.6}")).collect();
+                    let numbers: Vec<String> = row.iter().map(|value| format!("{:>13}", fixed(*value, 6))).collect();
                     let name = if i == 0 { format!("K at {place}") } else { String::new() };
                     line(&name, format!("[{}]", numbers.join(" ")));
                 }
             }
         }
         if let Some(s) = &self.s {
-            line("s", s.iter().map(|s| format!("{s:.4e}")).collect::<Vec<_>>().join(", "));
+            line("s", s.iter().map(|s| about(*s)).collect::<Vec<_>>().join(", "));
         }
         if let Some(cost) = self.guaranteed_cost {
-            line("cost bound", format!("{cost:.6}  ({})", self.verdict.word()));
+            line("cost bound", format!("{}  ({})", decimal(cost, 7, Rounding::Up), self.verdict.word()));
         }
         if let Some((name, margin)) =
             self.residuals.0.iter().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| self.k.is_some())
         {
-            line("least margin", format!("{margin:.3e}  proved, of {} blocks, in \"{name}\"", self.residuals.0.len()));
+            line(
+                "least margin",
+                format!("{}  proved, of {} blocks, in \"{name}\"", at_least(*margin), self.residuals.0.len()),
+            );
         }
         line("verdict", format!("{}: {}", self.verdict.word(), self.verdict_reason));
         line("iterations", format!("{} in {:.4} s", self.iterations, self.seconds));

@@ -84,12 +84,13 @@ pub(super) fn controller(
         return door.refuse(format!("{key}.high_gain"), "belongs to method \"high-gain-slpvqr\" only");
     }
     if let Some(gamma) = method.gamma() {
-        let Some(sigma) = limits.symmetric_bound(defaults.operating_input) else {
+        let sigma = limits.symmetric_bound(defaults.operating_input);
+        if !sigma.iter().all(|sigma| sigma.is_finite()) {
             return door.refuse(
                 format!("{key}.limits"),
                 "a saturated method needs a limit on every input; give [limits] min and max",
             );
-        };
+        }
         if !sigma.iter().all(|sigma| (sigma * sigma / gamma).is_normal()) {
             return door.refuse(
                 format!("{key}.gamma"),

@@ -5,6 +5,7 @@ mod problems;
 mod program;
 mod run;
 mod sdp;
+mod soundness;
 mod stages;
 mod thesis;
 mod transformation;

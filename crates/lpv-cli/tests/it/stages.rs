@@ -54,7 +54,7 @@ fn certify_checks_every_saved_design() {
         place.succeed("design scenario.toml --out designs");
         for file in place.designs("designs") {
             let text = place.succeed(&format!("certify designs/{file}"));
-            assert!(text.contains(": numerical\n"), "{text}");
+            assert!(text.contains(": numerical\n") || text.contains(": proved\n"), "{text}");
             let certificate = parsed(&place.succeed(&format!("certify designs/{file} --json")));
             let claims = certificate["claims"].as_array().unwrap();
             assert!(
@@ -110,7 +110,7 @@ fn a_negated_gain_is_refuted() {
             assert!(ended.out.contains("  refuted: "), "{}", ended.out);
             let ended = place.lpv("certify edited.json --json");
             let certificate = parsed(&ended.out);
-            assert_eq!((ended.code, certificate.as_object().unwrap().len()), (4, 1));
+            assert_eq!((ended.code, &certificate["verdict"]), (4, &Value::from("refuted")));
             assert!(certificate["claims"].as_array().unwrap().iter().any(|claim| claim["verdict"] == "refuted"));
         }
     }
@@ -153,13 +153,14 @@ fn the_printed_gain_of_the_thesis_is_refuted() {
     ended.refuses(4, &["thesis-printed-gain", "refuted"]);
     let certificate = parsed(&ended.out);
     let claims = certificate["claims"].as_array().unwrap();
-    let stability = claims.iter().find(|claim| claim["claim"] == "frozen closed loop is stable").unwrap();
+    let stability = claims.iter().find(|claim| claim["id"] == "frozen-stability").unwrap();
     assert_eq!(stability["verdict"], "refuted");
     assert!((stability["margin"].as_f64().unwrap() + 3.263).abs() < 1e-3);
     assert_eq!(stability["witness"]["parameter"], 0.0);
     for claim in claims {
         let keys: Vec<&String> = claim.as_object().unwrap().keys().collect();
-        assert_eq!(keys, ["cells", "claim", "margin", "seconds", "verdict", "witness"]);
+        let always = ["at", "cells", "claim", "detail", "id", "kind", "margin", "of", "premises", "seconds", "verdict"];
+        assert!(always.iter().all(|key| keys.iter().any(|found| found == key)), "{keys:?}");
     }
     // at rest it is refuted by a proof with a witness
     let ended = place.lpv("certify printed.json --rate 0 --json");

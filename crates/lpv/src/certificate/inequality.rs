@@ -8,6 +8,9 @@ use crate::plant::Plant;
 use crate::synthesis::{Design, FrozenDesign};
 use serde::Serialize;
 
+/// Limited inputs up to which every mixture of rows is computed.
+const MOST_ENUMERATED: usize = 10;
+
 /// λ_min of one block.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlockMargin {
@@ -50,25 +53,31 @@ fn point_margins(design: &Design, point: &FrozenDesign, model: &FrozenModel) -> 
         }
     };
 
+    let sigma = design.controller.limits.symmetric_bound(&design.controller.operating_input);
     match &point.auxiliary_gain {
         None => margins.push(block("performance".into(), performance(&gain))),
         Some(auxiliary) => {
             let inputs = gain.nrows();
-            margins.extend((0..1usize << inputs).map(|vertex| {
-                let mixture = Mat::from_fn(inputs, gain.ncols(), |i, j| {
-                    if vertex >> i & 1 == 1 { gain[(i, j)] } else { auxiliary[(i, j)] }
-                });
-                let name = format!("performance of mixture {vertex:0inputs$b}");
-                block(name, performance(&mixture))
+            // an input without limit flies K; of many inputs the two ends stand for all mixtures
+            let limited: Vec<usize> = (0..inputs).filter(|&i| sigma[i].is_finite()).collect();
+            let all = if limited.is_empty() { vec![1] } else { vec![0, u64::MAX] };
+            let vertices: Vec<u64> = match limited.len() {
+                count @ 1..=MOST_ENUMERATED => (0..1 << count).collect(),
+                _ => all,
+            };
+            margins.extend(vertices.into_iter().map(|vertex| {
+                let is_low =
+                    |i: usize| limited.iter().position(|&l| l == i).is_some_and(|bit| vertex >> bit.min(63) & 1 == 0);
+                let mixture =
+                    Mat::from_fn(inputs, gain.ncols(), |i, j| if is_low(i) { auxiliary[(i, j)] } else { gain[(i, j)] });
+                let rows: String = (0..inputs).rev().map(|i| if is_low(i) { '0' } else { '1' }).collect();
+                block(format!("performance of mixture {rows}"), performance(&mixture))
             }));
         }
     }
-    let limits = &design.controller.limits;
-    if let (Some(gamma), Some(sigma)) =
-        (design.method.gamma(), limits.symmetric_bound(&design.controller.operating_input))
-    {
+    if let Some(gamma) = design.method.gamma() {
         let unsaturated = point.auxiliary_gain.as_ref().unwrap_or(&gain) * &y;
-        margins.extend(sigma.iter().enumerate().map(|(i, bound)| {
+        margins.extend(sigma.iter().enumerate().filter(|(_, bound)| bound.is_finite()).map(|(i, bound)| {
             let matrix = unsaturated_block(&y, &unsaturated, i, bound * bound / gamma);
             block(format!("input {} unsaturated", i + 1), smallest_eigenvalue(&matrix))
         }));

@@ -19,6 +19,8 @@ mod nonlinear;
 mod polytopic;
 mod record;
 mod sampled;
+mod weights;
+mod witness;
 
 pub use closed_loop::Unprovable;
 pub use gain::prove_gain;
@@ -28,7 +30,8 @@ pub use nonlinear::NonlinearProof;
 pub use polytopic::{PolytopicClaim, PolytopicLyapunov, prove_polytopic};
 pub use record::{Record, RecordError};
 
-use super::{Claim, Verdict, Witness};
+use super::claim::{Claim, ClaimKind, Of, Verdict, Witness, Words, settle};
+use crate::math::decimal::{about, at_least};
 use crate::math::interval::Interval;
 use crate::plant::Plant;
 use crate::synthesis::Design;
@@ -83,10 +86,10 @@ struct Cells<'a, M> {
 enum Attempt {
     /// With the least margin.
     Proved(f64),
-    /// At this position, for this rate.
-    Refuted { t: f64, rate: f64, direction: Vec<f64>, value: f64 },
-    /// At this position.
-    Open { t: f64, half: f64 },
+    /// The matrix is not definite in the middle of this place, for this rate.
+    Refuted { place: Place, rate: f64, direction: Vec<f64>, value: f64 },
+    /// Here.
+    Open { place: Place },
 }
 
 /// The worse of two.
@@ -181,7 +184,7 @@ fn step_through<M>(
     // what is left may be no more than the overlap
     while to - from > OVERLAP {
         let judged = if half < least {
-            Err(Attempt::Open { t: from, half })
+            Err(Attempt::Open { place: Place { middle: from, half, ..whole } })
         } else {
             let share = 0.5 * (to - from) / (0.5 * (to - from) / half).ceil();
             let next = new(from, share);
@@ -224,7 +227,7 @@ fn judge<M>(claims: &Judgement<M>, cell: &Cell<M>) -> Judged {
         match definiteness {
             Definiteness::Proved(found) => margin = margin.min(found),
             Definiteness::Refuted { direction, value } => {
-                return Judged::Refuted(Attempt::Refuted { t: cell.place.middle, rate, direction, value });
+                return Judged::Refuted(Attempt::Refuted { place: cell.place, rate, direction, value });
             }
             Definiteness::Open { fits } => open = Some(open.map_or(fits, |other| other.min(fits))),
         }
@@ -256,16 +259,25 @@ pub struct Proofs {
     pub cost_up_to: Option<f64>,
     /// The cost is at most this times V(x(0)).
     pub cost_factor: f64,
-    /// Level of the set that the saturated methods are certified on; `None` where inputs are not limited.
+    /// Level of the set that the claims are about; `None` where they hold everywhere.
     pub level: Option<f64>,
     /// What is proved of the nonlinear plant, if it was asked for and anything is.
     pub nonlinear: Option<NonlinearProof>,
 }
 
+impl Proofs {
+    /// Whether the claim counts in the verdict on the design: all that the design, or the caller, claims. What is looked for beyond that
+    /// is a finding, and counts if it is proved.
+    pub fn is_counted(&self, claim: &Claim) -> bool {
+        let is_decided = matches!(claim.verdict, Verdict::Proved | Verdict::Refuted);
+        self.asked || is_decided || matches!(claim.kind, ClaimKind::AsAsked { .. })
+    }
+}
+
 /// Prove what can be proved of `design`, for the plant that it names:
 ///
-/// 1. P(ρ) ≻ 0;
-/// 2. of the saturated methods: on {V ≤ γ} the low gain (K, or F of high gain) does not saturate;
+/// 1. Q ⪰ 0, R ≻ 0 and P(ρ) ≻ 0;
+/// 2. on {V ≤ γ} no limited input of the low gain (K, or F of high gain) saturates;
 /// 3. V falls along every motion of the LPV model with |ρ̇| ≤ r, under every mixture of saturated rows, so that {V ≤ γ} is
 ///    invariant;
 /// 4. the cost is at most V(x(0)) times a factor for |ρ̇| ≤ r;
@@ -273,23 +285,12 @@ pub struct Proofs {
 /// 6. where it is asked for, the largest set {V ≤ c} that is invariant for the nonlinear plant.
 pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Result<Proofs, Unprovable> {
     let closed_loop = ClosedLoop::new(design, plant)?;
-    let parameter = plant.description().scheduling.as_ref();
-    let words = Words {
-        every: parameter.map_or(String::new(), |s| format!(" for every {}", s.parameter)),
-        rate: parameter.map_or(String::new(), |s| format!("|d{}/dt|", s.parameter)),
-        unit: parameter.map_or(String::new(), |s| format!("{}/s", s.unit)),
-    };
-    let mut claims = vec![definite(&closed_loop, &words)];
-    let mut level = None;
-    let sigma = design.controller.limits.symmetric_bound(&design.controller.operating_input);
-    // a method that knows no saturation is good for the set on which there is none
-    let unsaturated_level = || sigma.as_ref().map(|sigma| closed_loop.unsaturated_level(sigma));
-    let gamma = options.level.or(design.method.gamma()).or_else(unsaturated_level);
-    if let (Some(gamma), Some(sigma)) = (gamma, &sigma) {
-        let (claim, proved_level) = unsaturated(&closed_loop, &words, sigma, gamma);
-        claims.push(claim);
-        level = Some(proved_level);
-    }
+    let words = words(plant);
+    let mut claims = vec![weights::claim(&design.weights, &words), definite(&closed_loop, &words)];
+    let asked_level = options.level.or(design.method.gamma());
+    // a frozen design claims its level at the grid points, and what is proved between them is a finding
+    let is_claimed = options.level.is_some() || design.rate_bounded.is_some() || !closed_loop.has_parameter;
+    let level = unsaturated(&closed_loop, &words, asked_level, is_claimed, &mut claims);
 
     let started = Instant::now();
     let mut cells = Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place| closed_loop.decrease(place));
@@ -300,16 +301,8 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         (true, Some(_)) => COST_INFLATION_RATE_BOUNDED,
         (true, None) => COST_INFLATION,
     };
-    let what = match level {
-        Some(level) => format!("the set x'P x <= {level} is invariant"),
-        None => "x'P x decreases".into(),
-    };
     let mut reached = [None, None];
-    for (place, (cost, factor, what)) in
-        [(0.0, 1.0, what), (1.0, cost_factor, format!("the cost is at most {cost_factor} x(0)'P x(0)"))]
-            .into_iter()
-            .enumerate()
-    {
+    for (place, (cost, factor)) in [(0.0, 1.0), (1.0, cost_factor)].into_iter().enumerate() {
         let (rate, attempt) = match asked {
             Some(rate) => (rate, decrease(&mut cells, LEAST_HALF, rate, factor, cost)),
             None => largest_rate(&mut cells, factor, cost),
@@ -317,19 +310,36 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         if let Attempt::Proved(_) = attempt {
             reached[place] = Some(rate);
         }
-        let motion = if words.rate.is_empty() {
-            String::new()
-        } else {
-            format!(" for {} <= {rate:.4} {}", words.rate, words.unit)
+        let motion = closed_loop.motion(rate);
+        let kind = match (place, level) {
+            (0, None) => ClaimKind::Decrease { motion },
+            (0, Some(level)) => ClaimKind::Invariance { level, motion },
+            _ => ClaimKind::Cost { factor, level, motion },
         };
-        let mut claim =
-            words.claim(format!("{what}{motion}{}", words.every), attempt, &closed_loop, cells.len(), started);
+        let premises: &[&str] = match (place, level) {
+            (0, None) => &["lyapunov-definite"],
+            (0, Some(_)) => &["lyapunov-definite", "unsaturated"],
+            (_, None) => &["weights", "lyapunov-definite"],
+            (_, Some(_)) => &["weights", "lyapunov-definite", "unsaturated", "invariance"],
+        };
+        let witness = match (&attempt, place) {
+            (Attempt::Refuted { .. }, 0) => closed_loop.leaves(&attempt, level),
+            (Attempt::Refuted { place, .. } | Attempt::Open { place, .. }, _) => closed_loop.costs_more(place, factor),
+            _ => None,
+        };
+        let mut claim = words.claim(kind, attempt, &closed_loop, cells.len(), started).resting_on(premises);
+        claim = claim.refuted_by(witness);
         if asked.is_none() && claim.verdict == Verdict::Refuted {
             // nobody claimed it: with the gain between the grid points this P is no bound even at rest, another may be
             claim.verdict = Verdict::Undecided;
             claim.detail = format!("no rate could be proved: {}", claim.detail);
         }
         claims.push(claim);
+    }
+    if let (Some(rate), None) = (options.rate.filter(|_| closed_loop.has_parameter), reached[0]) {
+        let (found, attempt) = largest_rate(&mut cells, 1.0, 0.0);
+        let proved = matches!(attempt, Attempt::Proved(_)).then_some(found);
+        claims.push(Claim::new(ClaimKind::AsAsked { what: "rate", asked: rate, proved }, Of::Model, &words));
     }
     claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
     let mut nonlinear = None;
@@ -338,8 +348,27 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         claims.extend(found);
         nonlinear = proof;
     }
-    let [stable_up_to, cost_up_to] = reached;
-    Ok(Proofs { claims, asked: asked.is_some(), stable_up_to, cost_up_to, cost_factor, level, nonlinear })
+    settle(&mut claims);
+    // what a claim rests on is part of what is reached
+    let holds = |name: &str| claims.iter().filter(|c| c.id.name == name).all(|c| c.verdict == Verdict::Proved);
+    let stable_up_to = reached[0].filter(|_| holds("decrease") && holds("invariance"));
+    let cost_up_to = reached[1].filter(|_| holds("cost"));
+    Ok(Proofs { asked: asked.is_some(), stable_up_to, cost_up_to, cost_factor, level, nonlinear, claims })
+}
+
+/// Names of the plant's parameter.
+pub(super) fn words(plant: &dyn Plant) -> Words {
+    let parameter = plant.description().scheduling.as_ref();
+    Words {
+        parameter: parameter.map_or(String::new(), |s| s.parameter.clone()),
+        unit: parameter.map_or(String::new(), |s| s.unit.clone()),
+        lyapunov: "x'P x",
+    }
+}
+
+/// The witness that the frozen loop is not stable at `rho`, where that can be proved.
+pub(super) fn unstable_at(design: &Design, plant: &dyn Plant, rho: f64) -> Option<Witness> {
+    ClosedLoop::new(design, plant).ok()?.does_not_rest(rho)
 }
 
 /// P(ρ) of the Lyapunov function that [`prove`] is about; `None` where there is none.
@@ -347,51 +376,39 @@ pub fn lyapunov_matrix(design: &Design, plant: &dyn Plant, rho: f64) -> Option<c
     ClosedLoop::new(design, plant).ok()?.form.p(rho)
 }
 
-/// Names of the parameter and its units in claims.
-struct Words {
-    every: String,
-    rate: String,
-    unit: String,
-}
-
 impl Words {
     fn claim(
         &self,
-        claim: String,
+        kind: ClaimKind,
         attempt: Attempt,
         closed_loop: &ClosedLoop,
         cells: usize,
         started: Instant,
     ) -> Claim {
-        let place = |t: f64| match closed_loop.has_parameter {
-            true => format!(" at parameter {:.6}", closed_loop.parameter(t)),
+        let at = |place: &Place| match closed_loop.has_parameter {
+            true => format!(" at parameter {}", about(closed_loop.parameter(place.middle))),
             false => String::new(),
         };
-        let (verdict, margin, detail, witness) = match attempt {
+        let (verdict, margin, detail, place) = match attempt {
             Attempt::Proved(margin) => {
-                (Verdict::Proved, margin, format!("relative margin {margin:.1e}, {cells} cells"), None)
+                (Verdict::Proved, margin, format!("relative margin {}, {cells} cells", at_least(margin)), None)
             }
-            Attempt::Refuted { t, rate, direction, value } => {
-                let witness = Witness {
-                    parameter: closed_loop.parameter(t),
-                    rate,
-                    state: closed_loop.state(t, &direction),
-                    value,
-                    ..Witness::default()
-                };
-                let detail = format!("fails{} with rate {rate:.4}", place(t));
-                (Verdict::Refuted, value, detail, Some(witness))
+            Attempt::Refuted { place, rate, value, .. } => {
+                let rate = if rate == 0.0 { String::new() } else { format!(" with rate {}", about(rate)) };
+                (Verdict::Undecided, value, format!("its condition fails{}{rate}", at(&place)), Some(place))
             }
-            Attempt::Open { t, half } => {
+            Attempt::Open { place } => {
                 let detail = format!(
-                    "open{} on a cell of {:.1e} of a grid step: too close to the edge to be told",
-                    place(t),
-                    2.0 * half
+                    "open{} on a cell of {} of a grid step: too close to the edge to be told",
+                    at(&place),
+                    about(2.0 * place.half)
                 );
-                (Verdict::Undecided, f64::NAN, detail, None)
+                (Verdict::Undecided, f64::NAN, detail, Some(place))
             }
         };
-        Claim { claim, verdict, margin, detail, witness, cells, seconds: started.elapsed().as_secs_f64() }
+        let at = place.filter(|_| closed_loop.has_parameter).map(|place| closed_loop.parameter(place.middle));
+        let claim = Claim::new(kind, Of::Model, self).decided(verdict, margin, detail);
+        Claim { at, cells, seconds: started.elapsed().as_secs_f64(), ..claim }
     }
 }
 
@@ -399,16 +416,37 @@ fn definite(closed_loop: &ClosedLoop, words: &Words) -> Claim {
     let started = Instant::now();
     let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| closed_loop.bordered(place, None));
     let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
-    words.claim(format!("P is positive definite{}", words.every), attempt, closed_loop, cells.len(), started)
+    let witness = closed_loop.witness(&attempt);
+    words.claim(ClaimKind::LyapunovDefinite, attempt, closed_loop, cells.len(), started).refuted_by(witness)
 }
 
-/// The claim for the largest level of [`LEVELS`] times γ that is proved, or else for γ; and that level.
-fn unsaturated(closed_loop: &ClosedLoop, words: &Words, sigma: &[f64], gamma: f64) -> (Claim, f64) {
+/// The claim that no limited input saturates on the set of level γ, asked for or found, and of the level that is proved; it is
+/// added to `claims`, and a second one where less than was asked for is proved. The level of the set that further claims are about:
+/// `None` where nothing can saturate and they hold everywhere.
+fn unsaturated(
+    closed_loop: &ClosedLoop,
+    words: &Words,
+    asked: Option<f64>,
+    is_claimed: bool,
+    claims: &mut Vec<Claim>,
+) -> Option<f64> {
+    let rows = closed_loop.limited_rows();
+    if rows.is_empty() {
+        return None;
+    }
+    let gamma = asked.unwrap_or_else(|| closed_loop.unsaturated_level());
     let started = Instant::now();
+    if let Some(&stuck) = rows.iter().find(|&&i| closed_loop.sigma[i] <= 0.0) {
+        let kind = ClaimKind::Unsaturated { level: gamma };
+        let detail =
+            format!("input {} has no room on one side of its operating value, and its gain is not zero", stuck + 1);
+        let claim = Claim::new(kind, Of::Model, words).decided(Verdict::Undecided, f64::NAN, detail);
+        claims.push(claim.resting_on(&["lyapunov-definite"]));
+        return Some(gamma);
+    }
     let attempt = |level: f64| {
-        let mut cells = Cells::new(closed_loop.pieces, closed_loop.inputs(), |place: &Place| {
-            let bound = Interval::point(sigma[place.variant]) * sigma[place.variant] / level;
-            closed_loop.bordered(place, Some((Row::Input(place.variant), bound)))
+        let mut cells = Cells::new(closed_loop.pieces, rows.len(), |place: &Place| {
+            closed_loop.bordered(place, Some((Row::Limited(rows[place.variant]), Interval::point(1.0) / level)))
         });
         let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
         (level, attempt, cells.len())
@@ -419,8 +457,16 @@ fn unsaturated(closed_loop: &ClosedLoop, words: &Words, sigma: &[f64], gamma: f6
         Attempt::Proved(_) => first,
         _ => attempts.find(|(_, attempt, _)| matches!(attempt, Attempt::Proved(_))).unwrap_or(first),
     };
-    let claim = format!("the low gain does not saturate on x'P x <= {level}{}", words.every);
-    (words.claim(claim, attempt, closed_loop, cells, started), level)
+    let is_proved = matches!(attempt, Attempt::Proved(_));
+    let witness = closed_loop.saturates(&attempt, &rows);
+    let kind = ClaimKind::Unsaturated { level };
+    let claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&["lyapunov-definite"]);
+    claims.push(claim.refuted_by(witness));
+    if let Some(asked) = asked.filter(|asked| is_claimed && is_proved && *asked != level) {
+        let kind = ClaimKind::AsAsked { what: "level", asked, proved: Some(level) };
+        claims.push(Claim::new(kind, Of::Model, words));
+    }
+    Some(level)
 }
 
 /// κ(constant ± r rate) + c cost ≻ 0 on every cell.

@@ -73,7 +73,8 @@ impl StepBound {
 pub fn step_bound(design: &Design, scheduling: Option<&Scheduling>, step: &StepConditions) -> StepBound {
     let p = lyapunov_matrix(design, scheduling, step.parameter);
     let level = design.method.gamma().or_else(|| {
-        let sigma = design.controller.limits.symmetric_bound(&design.controller.operating_input)?;
+        let sigma = design.controller.limits.room(&design.controller.operating_input);
+        sigma.iter().any(|sigma| sigma.is_finite()).then_some(())?;
         let schedule = &design.controller.schedule;
         let at_rest = unsaturated_level(&p, &schedule.gain_matrix(step.parameter), &sigma);
         // where the parameter may move the state has to stay inside at every value of it
@@ -126,7 +127,9 @@ pub fn unsaturated_level(p: &Mat<f64>, k: &Mat<f64>, sigma: &[f64]) -> f64 {
     };
     let level = |i: usize| {
         let row: Vec<f64> = (0..k.ncols()).map(|j| k[(i, j)]).collect();
-        sigma[i] * sigma[i] / quadratic_form(&y, &row)
+        let size = quadratic_form(&y, &row).sqrt();
+        // a row of zeros never reaches a limit
+        if size == 0.0 { f64::INFINITY } else { (sigma[i] / size).powi(2) }
     };
     (0..k.nrows()).map(level).fold(f64::INFINITY, f64::min)
 }

@@ -4,8 +4,8 @@
 //! them adds nothing that would have to be proved. A governor with moving references adds one claim, that the
 //! references are motions of the model ([`MotionProof`]).
 
+use super::claim::{Claim, ClaimId, Member, Subject, Verdict, settle, worst};
 use super::proof::{MotionProof, ProofOptions, Proofs, Unprovable, prove, prove_motion};
-use super::{Claim, Verdict};
 use crate::plant::Plant;
 use crate::synthesis::Design;
 
@@ -40,11 +40,8 @@ pub fn prove_supervised(
     let members: Vec<Proofs> = std::iter::once(Ok(outer)).chain(inner).collect::<Result<_, _>>()?;
     let designs = || std::iter::once(design).chain(&design.inner);
     let mut claims = members[0].claims.clone();
-    for (proofs, inner) in members[1..].iter().zip(&design.inner) {
-        let level = inner.method.gamma().unwrap_or(f64::NAN);
-        let named =
-            |claim: &Claim| Claim { claim: format!("inner set of level {level}: {}", claim.claim), ..claim.clone() };
-        claims.extend(proofs.claims.iter().map(named));
+    for (k, proofs) in members[1..].iter().enumerate() {
+        claims.extend(proofs.claims.iter().cloned().map(|claim| claim.of_member(Member::Inner(k))));
     }
     let level = |proofs: &Proofs, design: &Design| proofs.level.or(design.method.gamma()).unwrap_or(f64::NAN);
     let levels: Vec<(&Design, f64)> =
@@ -54,7 +51,17 @@ pub fn prove_supervised(
     let governor = supervisor.and_then(|supervisor| supervisor.governor.as_ref());
     let motion = governor.and_then(|governor| Some((governor, governor.motion.as_ref()?)));
     let motion = motion.map(|(governor, motion)| prove_motion(governor, motion, &levels, plant));
-    claims.extend(motion.iter().map(|motion| motion.claim.clone()));
+    // what the sets absorb follows from the cost bound of each
+    let absorbing = |k: usize| {
+        let member = if k == 0 { Member::Outer } else { Member::Inner(k - 1) };
+        ClaimId { name: "cost", subject: Subject { member, ..Subject::default() } }
+    };
+    claims.extend(
+        motion
+            .iter()
+            .map(|motion| Claim { premises: (0..members.len()).map(absorbing).collect(), ..motion.claim.clone() }),
+    );
+    settle(&mut claims);
     let has_parameter = plant.description().scheduling.is_some();
     let rate = members.iter().try_fold(f64::INFINITY, |least, proofs| {
         let reached = proofs.stable_up_to.zip(proofs.cost_up_to).map(|(a, b)| a.min(b))?;
@@ -66,7 +73,7 @@ pub fn prove_supervised(
 impl SupervisedProofs {
     /// The worst verdict of its claims.
     pub fn verdict(&self) -> Verdict {
-        self.claims.iter().map(|claim| claim.verdict).min().unwrap_or(Verdict::Undecided)
+        worst(&self.claims)
     }
 
     /// V/γ with the proved γ, from V/γ with the γ that the controller watches, of member `member`.

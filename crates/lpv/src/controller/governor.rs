@@ -97,12 +97,16 @@ impl Governor {
     /// the actuators around `operating_input`. Always so for static references.
     pub fn authority_is_divided(&self, limits: &InputLimits, operating_input: &[f64]) -> bool {
         let Some(motion) = &self.motion else { return true };
-        let bounds = limits.symmetric_bound(operating_input).zip(motion.actuators.symmetric_bound(operating_input));
-        bounds.is_some_and(|(feedback, all)| {
-            motion.input_budget.len() == all.len()
-                && (0..all.len())
-                    .all(|i| motion.input_budget[i] >= 0.0 && motion.input_budget[i] + feedback[i] <= all[i])
-        })
+        let (feedback, all) = (limits.symmetric_bound(operating_input), motion.actuators.room(operating_input));
+        // a + b ≤ c of the numbers themselves, not of their rounded sum
+        let fits = |budget: f64, feedback: f64, all: f64| {
+            let sum = budget + feedback;
+            let lost = (budget - (sum - feedback)) + (feedback - (sum - (sum - feedback)));
+            sum < all || sum == all && (lost <= 0.0 || sum.is_infinite())
+        };
+        motion.input_budget.len() == all.len()
+            && (0..all.len())
+                .all(|i| motion.input_budget[i] >= 0.0 && fits(motion.input_budget[i], feedback[i], all[i]))
     }
 
     /// The profile of the move `delta` of the set-point states along `motion`, for the plant's scheduling state.

@@ -5,6 +5,8 @@
 //! or controllers.
 
 pub mod angle;
+pub mod decimal;
+pub mod definite;
 pub mod eigen;
 pub mod hold;
 pub mod hosvd;

@@ -238,11 +238,8 @@ pub(super) fn assemble(
 
 /// σ of every input, or which input has none.
 fn symmetric_bound(limits: &InputLimits, operating_input: &[f64]) -> Result<Vec<f64>, SynthesisError> {
-    let unlimited = || SynthesisError::UnlimitedInput {
-        input: (0..operating_input.len()).find(|&i| limits.min[i].is_none() && limits.max[i].is_none()).unwrap_or(0),
-    };
-    let sigma = limits.symmetric_bound(operating_input).ok_or_else(unlimited)?;
-    match sigma.iter().position(|&bound| bound <= 0.0) {
+    let sigma = limits.symmetric_bound(operating_input);
+    match sigma.iter().position(|&bound| !(bound > 0.0 && bound.is_finite())) {
         Some(input) => Err(SynthesisError::UnlimitedInput { input }),
         None => Ok(sigma),
     }

@@ -190,7 +190,10 @@ pub fn governor(
         None => None,
         Some(share) => {
             let mut motion = motion(plant, &states, rate)?;
-            let sigma = actuators.symmetric_bound(&operating.input).ok_or(SupervisionError::NoCertifiedSet)?;
+            let sigma = actuators.symmetric_bound(&operating.input);
+            if !sigma.iter().all(|sigma| sigma.is_finite()) {
+                return Err(SupervisionError::NoCertifiedSet);
+            }
             motion.input_budget = sigma.iter().map(|sigma| share * sigma * (1.0 - ROUNDING)).collect();
             motion.state_bounds.clone_from(&options.state_bounds);
             motion.actuators = actuators.clone();

@@ -7,8 +7,11 @@ use super::{CostWeights, Design};
 use crate::controller::{CertifiedSet, Governor, Motion, Schedule, Supervisor};
 use crate::math::Mat;
 use crate::math::matrix::to_row_vec;
-use crate::model::MatrixFunction;
+use crate::model::{GridModel, MatrixFunction};
 use crate::plant::Plant;
+
+/// Values of the parameter at which the governor's rate is compared with the plant's.
+const FLOW_POINTS: usize = 64;
 
 impl Design {
     /// Check the inner designs, and the controller's supervisor against them.
@@ -99,10 +102,16 @@ impl Design {
                 return refuse(key("parameter_rate"), format!("is {found:?}"), expected);
             }
         }
-        governor.motion.as_ref().map_or(Ok(()), |motion| self.validate_motion(governor, motion, rate))
+        governor.motion.as_ref().map_or(Ok(()), |motion| self.validate_motion(governor, motion, plant, rate))
     }
 
-    fn validate_motion(&self, governor: &Governor, motion: &Motion, rate: f64) -> Result<(), DesignError> {
+    fn validate_motion(
+        &self,
+        governor: &Governor,
+        motion: &Motion,
+        plant: &dyn Plant,
+        rate: f64,
+    ) -> Result<(), DesignError> {
         let key = |part: &str| format!("controller.supervisor.governor.motion.{part}");
         let (n, m, d) = (self.weights.q.nrows(), self.weights.r.nrows(), governor.set_point_states.len());
         let order = motion.inputs.len();
@@ -129,6 +138,7 @@ impl Design {
         if motion.parameter_flow.is_some() != self.controller.scheduling_state.is_some() {
             return refuse(key("parameter_flow"), "does not fit the plant", "there exactly if it has a parameter");
         }
+        self.validate_flow(motion, plant)?;
         if !(motion.parameter_rate >= 0.0 && motion.parameter_rate <= rate) {
             let found = format!("is {}", motion.parameter_rate);
             return refuse(key("parameter_rate"), found, format!("from 0 to the certified rate {rate}"));
@@ -144,6 +154,25 @@ impl Design {
                 "what controller.limits leaves of motion.actuators, at most",
             ),
         }
+    }
+}
+
+impl Design {
+    /// The row that the governor takes for ρ̇ is the plant's.
+    fn validate_flow(&self, motion: &Motion, plant: &dyn Plant) -> Result<(), DesignError> {
+        let (Some(flow), Some(state)) = (&motion.parameter_flow, self.controller.scheduling_state) else {
+            return Ok(());
+        };
+        for point in GridModel::of_plant(plant, FLOW_POINTS).points {
+            let n = point.a.ncols();
+            let expected = Mat::from_fn(1, n, |_, j| point.a[(state, j)]);
+            if (flow.at(&[point.rho]) - &expected).norm_max() > SAME * expected.norm_max().max(f64::MIN_POSITIVE) {
+                let key = "controller.supervisor.governor.motion.parameter_flow";
+                let found = format!("differs from the plant's at parameter {}", point.rho);
+                return refuse(key, found, "the row of A for the parameter's rate");
+            }
+        }
+        Ok(())
     }
 }
 

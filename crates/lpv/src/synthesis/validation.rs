@@ -4,7 +4,9 @@
 use super::{Design, FrozenDesign, Method, RateBounded};
 use crate::controller::Schedule;
 use crate::math::Mat;
-use crate::math::matrix::{inverse_spd, is_finite, is_symmetric};
+use crate::math::decimal::about;
+use crate::math::definite::{Definiteness, asymmetry, definiteness, smallest_eigenvalue_about};
+use crate::math::matrix::is_finite;
 use crate::model::{BasisFunction, BoxWeights, MatrixFunction, parameter_grid};
 use crate::plant::{Plant, PlantParameterError, Scheduling};
 
@@ -55,8 +57,8 @@ impl Design {
         if !(self.sample_time_s > 0.0 && self.sample_time_s.is_finite()) {
             return refuse("sample_time_s", format!("is {}", self.sample_time_s), "positive and finite");
         }
-        definite("weights.q", &self.weights.q, n)?;
-        definite("weights.r", &self.weights.r, m)?;
+        definite("weights.q", &self.weights.q, n, true)?;
+        definite("weights.r", &self.weights.r, m, false)?;
         if let Some(gamma) = self.method.gamma().filter(|gamma| !(*gamma > 0.0 && gamma.is_finite())) {
             return refuse("method.gamma", format!("is {gamma}"), "positive and finite");
         }
@@ -70,7 +72,7 @@ impl Design {
         let is_high_gain = matches!(self.method, Method::HighGainSlpvqr { .. });
         for (k, point) in self.points.iter().enumerate() {
             shape(&format!("points[{k}].gain"), &point.gain, m, n)?;
-            definite(&format!("points[{k}].p"), &point.p, n)?;
+            definite(&format!("points[{k}].p"), &point.p, n, false)?;
             match &point.auxiliary_gain {
                 Some(gain) if is_high_gain => shape(&format!("points[{k}].auxiliary_gain"), gain, m, n)?,
                 None if !is_high_gain => {}
@@ -104,6 +106,9 @@ impl Design {
             return refuse("rate_bounded.rate", format!("is {}", bounded.rate), "finite, zero or more");
         }
         function("rate_bounded.y", &bounded.y, n, n)?;
+        for (k, coefficient) in bounded.y.coefficients.iter().enumerate() {
+            symmetric(&format!("rate_bounded.y.coefficients[{k}]"), coefficient, n)?;
+        }
         if let Some(l) = &bounded.l {
             function("rate_bounded.l", l, m, n)?;
         }
@@ -124,10 +129,12 @@ impl Design {
         let controller = &self.controller;
         let scheduling = plant.description().scheduling.as_ref();
         let operating = plant.trim(self.points[0].rho).input;
-        let is_trim = controller.operating_input.len() == m
-            && operating.iter().zip(&controller.operating_input).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()));
-        if !is_trim {
-            return refuse("controller.operating_input", "is not where the plant rests", format!("{operating:?}"));
+        if controller.operating_input != operating {
+            return refuse(
+                "controller.operating_input",
+                "is not where the plant rests",
+                format!("{operating:?}, to the last digit"),
+            );
         }
         let state = scheduling.map(|scheduling| scheduling.state);
         if controller.scheduling_state != state {
@@ -139,30 +146,17 @@ impl Design {
             return refuse("controller.limits", "has the wrong length", format!("{m} numbers or nulls each"));
         }
         let encloses = |i: usize| {
-            limits.min[i].is_none_or(|min| min < operating[i]) && limits.max[i].is_none_or(|max| max > operating[i])
+            limits.min[i].is_none_or(|min| min <= operating[i]) && limits.max[i].is_none_or(|max| max >= operating[i])
         };
         if !(0..m).all(encloses) {
-            return refuse("controller.limits", "exclude the operating input", "on either side of it, strictly");
+            return refuse("controller.limits", "exclude the operating input", "on either side of it");
         }
-        if self.method.gamma().is_some() && limits.symmetric_bound(&operating).is_none() {
-            return refuse(
-                "controller.limits",
-                "leave an input unlimited",
-                "there for every input of a saturated method",
-            );
-        }
-
         let gains = match (&controller.schedule, scheduling) {
             (Schedule::Constant { gain }, None) => vec![gain],
             (Schedule::Grid { parameters, period, gains }, Some(scheduling)) => {
                 same_grid("controller.schedule.parameters", parameters, Some(scheduling))?;
                 let expected = scheduling.periodic.then(|| scheduling.range[1] - scheduling.range[0]);
-                let same = |a: f64, b: f64| (a - b).abs() <= SAME * b.abs();
-                let is_same = match (*period, expected) {
-                    (Some(found), Some(expected)) => same(found, expected),
-                    (found, expected) => found == expected,
-                };
-                if !is_same || gains.len() != parameters.len() {
+                if *period != expected || gains.len() != parameters.len() {
                     return refuse(
                         "controller.schedule",
                         "does not fit the grid",
@@ -232,18 +226,57 @@ pub(super) fn function(key: &str, function: &MatrixFunction, rows: usize, column
     function.coefficients.iter().enumerate().try_for_each(each)
 }
 
-fn definite(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(), DesignError> {
+/// A proof reads the numbers of the file: they have to be symmetric to the bit.
+pub(super) fn symmetric(key: &str, matrix: &Mat<f64>, size: usize) -> Result<(), DesignError> {
     shape(key, matrix, size, size)?;
-    match is_symmetric(matrix, SAME) && inverse_spd(matrix).is_some() {
-        true => Ok(()),
-        false => refuse(key, "is not symmetric positive definite", "so"),
+    let Some((i, j)) = asymmetry(matrix) else { return Ok(()) };
+    refuse(
+        key,
+        format!(
+            "has {} in row {}, column {}, and {} in row {}, column {}",
+            matrix[(i, j)],
+            i + 1,
+            j + 1,
+            matrix[(j, i)],
+            j + 1,
+            i + 1
+        ),
+        "symmetric, the two the same number to the last digit",
+    )
+}
+
+/// Symmetric and ≻ 0, or ⪰ 0 where that is enough.
+fn definite(key: &str, matrix: &Mat<f64>, size: usize, or_singular: bool) -> Result<(), DesignError> {
+    symmetric(key, matrix, size)?;
+    let found = |what: &str| {
+        format!("is {what}: its smallest eigenvalue is about {}", about(smallest_eigenvalue_about(matrix)))
+    };
+    match definiteness(matrix) {
+        Some(Definiteness::Positive) => Ok(()),
+        Some(Definiteness::Semidefinite) if or_singular => Ok(()),
+        Some(Definiteness::Semidefinite) => refuse(key, found("singular"), "positive definite"),
+        Some(Definiteness::Indefinite) if or_singular => refuse(key, found("indefinite"), "positive semidefinite"),
+        Some(Definiteness::Indefinite) => refuse(key, found("indefinite"), "positive definite"),
+        None => refuse(key, "has entries of too different sizes to tell its definiteness", "positive definite"),
     }
 }
 
 /// The grid has to be the plant's of as many points, which a design covers its whole range with.
 fn same_grid(key: &str, found: &[f64], scheduling: Option<&Scheduling>) -> Result<(), DesignError> {
     let expected = parameter_grid(scheduling, found.len());
-    let is_same = expected.len() == found.len()
-        && expected.iter().zip(found).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs()));
-    if is_same { Ok(()) } else { refuse(key, "is not the plant's grid", "equidistant over the range of its parameter") }
+    if expected.len() != found.len() {
+        return refuse(
+            key,
+            format!("has {} values", found.len()),
+            format!("as many as the plant's grid, {}", expected.len()),
+        );
+    }
+    match expected.iter().zip(found).position(|(a, b)| a != b) {
+        Some(at) => refuse(
+            key,
+            format!("is not the plant's grid: number {} is {}", at + 1, found[at]),
+            format!("equidistant over the range of its parameter, here {}", expected[at]),
+        ),
+        None => Ok(()),
+    }
 }

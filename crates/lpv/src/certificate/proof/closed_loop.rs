@@ -1,8 +1,10 @@
 //! The closed LPV loop and its Lyapunov function over the continuous range of the parameter, as enclosures on cells.
 
 use super::matrix::{CellMatrix, TaylorMatrix};
+use crate::certificate::claim::Motion;
 use crate::controller::{InputLimits, Schedule};
 use crate::math::Mat;
+use crate::math::definite::asymmetry;
 use crate::math::interval::Interval;
 use crate::math::matrix::{inverse_spd, quadratic_form};
 use crate::math::taylor::Taylor;
@@ -36,6 +38,15 @@ pub enum Unprovable {
     /// The design carries nothing between its grid points that could be proved.
     #[error("its auxiliary gain is missing between the grid points")]
     NoAuxiliaryGain,
+    /// V is not a quadratic form of the numbers given.
+    #[error("its P or Y is not symmetric to the last digit")]
+    NotSymmetric,
+    /// The saturated input is never u*, and x* no point of rest.
+    #[error("the limits of input {input} do not enclose its operating value")]
+    OutsideLimits {
+        /// From 1.
+        input: usize,
+    },
 }
 
 /// Everything that the claims are about.
@@ -44,6 +55,8 @@ pub(super) struct ClosedLoop<'a> {
     schedule: &'a Schedule,
     pub weights: &'a CostWeights,
     pub limits: &'a InputLimits,
+    /// σᵢ: how far each input may go to either side of its operating value, rounded down; infinite where it is not limited.
+    pub sigma: Vec<f64>,
     pub form: Form,
     /// F(ρ) that stays unsaturated; in the inverse form L = FY.
     pub auxiliary: Option<MatrixFunction>,
@@ -59,8 +72,10 @@ pub(super) struct ClosedLoop<'a> {
 /// Which row borders P or Y, see [`ClosedLoop::bordered`].
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Row {
-    /// Of the unsaturated gain, of input `i`.
+    /// Of the low gain, of input `i`: F where a high gain may saturate, else K.
     Input(usize),
+    /// The same over σᵢ.
+    Limited(usize),
     /// The unit vector of state `i`.
     State(usize),
 }
@@ -98,6 +113,7 @@ pub(super) struct Parts {
 impl<'a> ClosedLoop<'a> {
     /// Of a design, for the plant that it names.
     pub fn new(design: &'a Design, plant: &'a dyn Plant) -> Result<Self, Unprovable> {
+        refuse_unusable(design)?;
         let schedule = &design.controller.schedule;
         let scheduling = plant.description().scheduling.as_ref();
         let first = design.points[0].rho;
@@ -148,12 +164,43 @@ impl<'a> ClosedLoop<'a> {
         let weights = &design.weights;
         let has_parameter = scheduling.is_some();
         let limits = &design.controller.limits;
-        Ok(Self { plant, schedule, weights, limits, form, auxiliary, low, step, pieces, has_parameter })
+        let sigma = limits.room(&design.controller.operating_input);
+        Ok(Self { plant, schedule, weights, limits, sigma, form, auxiliary, low, step, pieces, has_parameter })
     }
 
-    /// Number of mixtures of the rows of K and F: 2^m with an auxiliary gain, else K alone.
+    /// Whether the gain that flies may saturate on the set, so that input `i` lies between rows of F and K.
+    pub fn may_saturate(&self, i: usize) -> bool {
+        self.auxiliary.is_some() && self.sigma[i].is_finite()
+    }
+
+    /// The inputs that may.
+    pub fn saturating(&self) -> Vec<usize> {
+        (0..self.inputs()).filter(|&i| self.may_saturate(i)).collect()
+    }
+
+    /// Number of mixtures of the rows of K and F: two for each input that may saturate.
     pub fn mixtures(&self) -> usize {
-        if self.auxiliary.is_some() { 1 << self.weights.r.nrows() } else { 1 }
+        1 << self.saturating().len()
+    }
+
+    /// How the parameter moves at up to `rate`.
+    pub fn motion(&self, rate: f64) -> Motion {
+        match (self.has_parameter, rate) {
+            (false, _) => Motion::None,
+            (true, 0.0) => Motion::AtRest,
+            (true, rate) => Motion::Bounded { rate },
+        }
+    }
+
+    /// The inputs that are limited and that the low gain moves: rows of zeros never reach a limit.
+    pub fn limited_rows(&self) -> Vec<usize> {
+        let moves = |i: usize| {
+            (0..self.pieces).any(|piece| {
+                let t = Taylor::variable(Interval::new(piece as f64, piece as f64 + 1.0));
+                self.low_row(piece, i, t).iter().any(|entry| !entry.is_zero())
+            })
+        };
+        (0..self.inputs()).filter(|&i| self.sigma[i].is_finite() && moves(i)).collect()
     }
 
     /// What the plant is.
@@ -169,6 +216,11 @@ impl<'a> ClosedLoop<'a> {
     /// ρ at position `t`, as a number.
     pub fn parameter(&self, t: f64) -> f64 {
         self.low + t * self.step.middle()
+    }
+
+    /// The position of ρ, as a number; 0 where there is no parameter.
+    pub fn position(&self, rho: f64) -> f64 {
+        if self.has_parameter { (rho - self.low) / self.step.middle() } else { 0.0 }
     }
 
     /// ρ as a function of `t`.
@@ -197,9 +249,13 @@ impl<'a> ClosedLoop<'a> {
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let (a, b, k) = self.model_and_gain(piece, t);
         let CostWeights { q, r } = self.weights;
+        // an input that is not limited is always the one of K
+        let saturating = self.saturating();
+        let is_saturated =
+            |i: usize| saturating.iter().position(|&other| other == i).is_some_and(|bit| mixture >> bit & 1 == 0);
         let mixed = |k: TaylorMatrix, f: Option<TaylorMatrix>| match f {
             None => k,
-            Some(f) => TaylorMatrix::from_fn(m, n, |i, j| if mixture >> i & 1 == 1 { k.at(i, j) } else { f.at(i, j) }),
+            Some(f) => TaylorMatrix::from_fn(m, n, |i, j| if is_saturated(i) { f.at(i, j) } else { k.at(i, j) }),
         };
         let auxiliary = self.auxiliary.as_ref().map(|f| TaylorMatrix::of_function(f, rho));
         match &self.form {
@@ -247,27 +303,22 @@ impl<'a> ClosedLoop<'a> {
         CellMatrix::new(&middle, &over)
     }
 
+    /// P or Y in the middle of a place.
+    pub fn bordered_at_middle(&self, place: &Place) -> TaylorMatrix {
+        self.bordered_at(place.piece, None, Taylor::variable_of_first_order(Interval::point(place.middle)))
+    }
+
     fn bordered_at(&self, piece: usize, border: Option<(Row, Interval)>, t: Taylor) -> TaylorMatrix {
         let rho = self.rho(t);
-        let (n, m) = (self.weights.q.nrows(), self.inputs());
+        let n = self.weights.q.nrows();
         let (Form::Direct(function) | Form::Inverse(function)) = &self.form;
         let matrix = TaylorMatrix::of_function(function, rho);
         let Some((row, bound)) = border else { return matrix };
         let row: Vec<Taylor> = match row {
-            Row::Input(i) => {
-                // that row alone
-                let row = |gain: &TaylorMatrix| TaylorMatrix::from_fn(1, n, |_, j| gain.at(i, j));
-                let gain = match &self.auxiliary {
-                    Some(auxiliary) => row(&TaylorMatrix::of_function(auxiliary, rho)),
-                    None => {
-                        let k = row(&TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho)));
-                        match self.form {
-                            Form::Direct(_) => k,
-                            Form::Inverse(_) => k.times(&matrix),
-                        }
-                    }
-                };
-                (0..n).map(|j| gain.at(0, j)).collect()
+            Row::Input(i) => self.low_row(piece, i, t),
+            Row::Limited(i) => {
+                let sigma = Interval::point(self.sigma[i]);
+                self.low_row(piece, i, t).into_iter().map(|entry| entry / Taylor::constant(sigma)).collect()
             }
             Row::State(i) => match self.form {
                 Form::Direct(_) => (0..n).map(|j| Taylor::from(if i == j { 1.0 } else { 0.0 })).collect(),
@@ -282,6 +333,24 @@ impl<'a> ClosedLoop<'a> {
         })
     }
 
+    /// Row `i` of the low gain: of F where input `i` may saturate, else of K; in the inverse form of FY or KY.
+    fn low_row(&self, piece: usize, i: usize, t: Taylor) -> Vec<Taylor> {
+        let rho = self.rho(t);
+        let (n, m) = (self.weights.q.nrows(), self.inputs());
+        let row = |gain: &TaylorMatrix| TaylorMatrix::from_fn(1, n, |_, j| gain.at(i, j));
+        let gain = match (&self.auxiliary, &self.form) {
+            (Some(auxiliary), _) if self.may_saturate(i) => row(&TaylorMatrix::of_function(auxiliary, rho)),
+            (_, form) => {
+                let k = row(&TaylorMatrix::new(m, n, self.schedule.gain_on_piece(piece, t, rho)));
+                match form {
+                    Form::Direct(_) => k,
+                    Form::Inverse(y) => k.times(&TaylorMatrix::of_function(y, rho)),
+                }
+            }
+        };
+        (0..n).map(|j| gain.at(0, j)).collect()
+    }
+
     /// P⁻¹ and the gain that stays unsaturated at position `t`, as numbers; `None` where P is not definite.
     pub fn inverse_and_gain(&self, t: f64) -> Option<(Mat<f64>, Mat<f64>)> {
         let rho = self.parameter(t);
@@ -289,24 +358,27 @@ impl<'a> ClosedLoop<'a> {
             Form::Direct(p) => inverse_spd(&p.at(&[rho]))?,
             Form::Inverse(y) => y.at(&[rho]),
         };
-        let gain = match (&self.auxiliary, &self.form) {
-            (None, _) => self.schedule.gain_matrix(rho),
+        let k = self.schedule.gain_matrix(rho);
+        let f = match (&self.auxiliary, &self.form) {
+            (None, _) => return Some((y, k)),
             (Some(f), Form::Direct(_)) => f.at(&[rho]),
             (Some(l), Form::Inverse(_)) => l.at(&[rho]) * inverse_spd(&y)?,
         };
-        Some((y, gain))
+        let low = Mat::from_fn(k.nrows(), k.ncols(), |i, j| if self.may_saturate(i) { f[(i, j)] } else { k[(i, j)] });
+        Some((y, low))
     }
 
-    /// Least level over sampled positions on which the gain that stays unsaturated reaches the bounds σ, as numbers: a guess
-    /// to be proved.
-    pub fn unsaturated_level(&self, sigma: &[f64]) -> f64 {
+    /// Least level over sampled positions on which the low gain reaches the limits, as numbers: a guess to be proved. Infinite where no
+    /// input is limited.
+    pub fn unsaturated_level(&self) -> f64 {
         let samples = LEVEL_SAMPLES_PER_PIECE * self.pieces;
         let level = |k: usize| {
             let t = k as f64 / LEVEL_SAMPLES_PER_PIECE as f64;
             let (y, gain) = self.inverse_and_gain(t)?;
             let of_input = |i: usize| {
                 let row: Vec<f64> = (0..gain.ncols()).map(|j| gain[(i, j)]).collect();
-                sigma[i] * sigma[i] / quadratic_form(&y, &row)
+                let size = quadratic_form(&y, &row).sqrt();
+                if size == 0.0 { f64::INFINITY } else { (self.sigma[i] / size).powi(2) }
             };
             Some((0..gain.nrows()).map(of_input).fold(f64::INFINITY, f64::min))
         };
@@ -322,6 +394,22 @@ impl<'a> ClosedLoop<'a> {
                 (0..y.nrows()).map(|i| (0..y.ncols()).map(|j| y[(i, j)] * direction[j]).sum()).collect()
             }
         }
+    }
+}
+
+/// What no file that was validated has, and a design made in memory might.
+fn refuse_unusable(design: &Design) -> Result<(), Unprovable> {
+    let y = design.rate_bounded.iter().flat_map(|bounded| &bounded.y.coefficients);
+    if design.points.iter().map(|point| &point.p).chain(y).any(|matrix| asymmetry(matrix).is_some()) {
+        return Err(Unprovable::NotSymmetric);
+    }
+    let (limits, operating) = (&design.controller.limits, &design.controller.operating_input);
+    let encloses = |i: usize| {
+        limits.min[i].is_none_or(|min| min <= operating[i]) && limits.max[i].is_none_or(|max| max >= operating[i])
+    };
+    match (0..operating.len()).find(|&i| !encloses(i)) {
+        Some(i) => Err(Unprovable::OutsideLimits { input: i + 1 }),
+        None => Ok(()),
     }
 }
 

@@ -3,7 +3,8 @@
 use super::closed_loop::Place;
 use super::matrix::{CellMatrix, TaylorMatrix};
 use super::{Attempt, Cells, LEAST_HALF};
-use crate::certificate::{Claim, Verdict, Witness};
+use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Words};
+use crate::math::decimal::{about, at_least};
 use crate::math::interval::Interval;
 use crate::math::taylor::Taylor;
 use crate::model::MatrixFunction;
@@ -60,27 +61,26 @@ pub fn prove_gain(model: &InputOutputModel, bound: &GainBound) -> Claim {
             break;
         }
     }
-    let (gain, attempt) = first.unwrap_or((bound.gain, Attempt::Open { t: 0.0, half: 1.0 }));
-    let motion = match bound.rate {
-        Some(rate) => format!("every parameter with |rate| <= {rate}"),
-        None => "every motion of the parameter".into(),
-    };
-    let words = format!("the induced L2 norm is at most {gain:.6} for {motion}");
-    let parameter = |t: f64| low + t * step.middle();
-    let mut claim = Claim::checked(words, Verdict::Undecided, f64::NAN, String::new());
+    let (gain, attempt) =
+        first.unwrap_or((bound.gain, Attempt::Open { place: Place { piece: 0, variant: 0, middle: 0.0, half: 1.0 } }));
+    let motion = bound.rate.map_or(Motion::Any, |rate| Motion::Bounded { rate });
+    let parameter = |place: &Place| low + place.middle * step.middle();
+    let mut claim = Claim::new(ClaimKind::InducedGain { gain, motion }, Of::Model, &Words::default());
     match attempt {
         Attempt::Proved(margin) => {
             (claim.verdict, claim.margin) = (Verdict::Proved, margin);
-            claim.detail = format!("relative margin {margin:.1e}, {} cells", cells.len());
+            claim.detail = format!("relative margin {}, {} cells", at_least(margin), cells.len());
         }
         // another P may do
-        Attempt::Refuted { t, rate, direction, value } => {
-            claim.margin = value;
-            claim.detail = format!("this P does not show it at parameter {:.6} with rate {rate}", parameter(t));
-            claim.witness =
-                Some(Witness { parameter: parameter(t), rate, state: direction, value, ..Witness::default() });
+        Attempt::Refuted { place, rate, value, .. } => {
+            (claim.margin, claim.at) = (value, Some(parameter(&place)));
+            let place = about(parameter(&place));
+            claim.detail = format!("this P does not show it at parameter {place} with rate {}", about(rate));
         }
-        Attempt::Open { t, .. } => claim.detail = format!("open at parameter {:.6}", parameter(t)),
+        Attempt::Open { place } => {
+            claim.at = Some(parameter(&place));
+            claim.detail = format!("open at parameter {}", about(parameter(&place)));
+        }
     }
     claim.cells = cells.len();
     claim.seconds = started.elapsed().as_secs_f64();

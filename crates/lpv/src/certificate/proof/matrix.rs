@@ -62,6 +62,11 @@ impl TaylorMatrix {
         Self::from_fn(rows, columns, |i, j| entries[j][i])
     }
 
+    /// Rows and columns.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.rows, self.columns)
+    }
+
     pub fn at(&self, i: usize, j: usize) -> Taylor {
         self.entries[i * self.columns + j]
     }

@@ -7,7 +7,8 @@
 //! R_k = Z_k − A Z_{k+1} − B U_{k+1},   S_k = ∂Z_k/∂ρ − B V_k,
 //! ```
 //!
-//! and − A(ρ)Z₀ times where the reference is. In exact arithmetic R, S and AZ₀ vanish; in the numbers of the file they are of the size of
+//! where the last holds for the ρ̇ that the governor takes, flow(ρ)(x − x*) of the file. The plant's is A_ρ(ρ)(x − x*) + B_ρ(ρ)u with its
+//! own rows; their difference times s⁽ᵏ⁾ BV_kΔ is added to w. Also − A(ρ)Z₀ times where the reference is. In exact arithmetic R, S and AZ₀ vanish; in the numbers of the file they are of the size of
 //! rounding errors. They are enclosed over cells of ρ, as the claims of `proof` are, and w is a disturbance to the error.
 //!
 //! **How much disturbance the set absorbs.** Let the cost claim be proved, V̇ ≤ −(xᵀQx)/κ without w, and let Y(ρ) ⪰ yI, Q ⪰ qI. On the
@@ -17,10 +18,12 @@
 //! |w| < q y^{3/2} √γ / (2κ).
 //! ```
 
+use super::COST_INFLATION_RATE_BOUNDED;
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use super::{COST_INFLATION_RATE_BOUNDED, Claim, Verdict};
+use crate::certificate::claim::{Claim, ClaimKind, Of, Verdict, Words};
 use crate::controller::{Governor, Motion};
 use crate::math::Mat;
+use crate::math::decimal::{at_least, at_most};
 use crate::math::eigen::smallest_eigenvalue;
 use crate::math::interval::Interval;
 use crate::math::matrix::inverse_spd;
@@ -52,6 +55,10 @@ pub struct MotionProof {
     residuals: Vec<Mat<f64>>,
     /// Bounds on the entries of S₁ … S_{K−1}.
     rate_residuals: Vec<Mat<f64>>,
+    /// Bounds on the entries of BV₁ … BV_{K−1}; empty where no input depends on the rate.
+    turning: Vec<Mat<f64>>,
+    /// Bound on the difference of the plant's ρ̇ to the governor's.
+    rate_gap: f64,
     /// Bounds on the entries of AZ₀.
     rest: Mat<f64>,
     /// |w| below this leaves every certified set of the controller invariant.
@@ -70,7 +77,9 @@ impl MotionProof {
             let along: f64 = self.residuals.iter().zip(&peaks).map(|(r, p)| p * row(r)).sum();
             let across: f64 = self.rate_residuals.iter().zip(&peaks).map(|(r, p)| p * row(r)).sum();
             let rest: f64 = (0..delta.len()).map(|j| self.rest[(i, j)]).sum();
-            along + motion.parameter_rate * across + FARTHEST_PLACE * rest
+            let turning: f64 = self.turning.iter().zip(&peaks).map(|(r, p)| p * row(r)).sum();
+            let unforeseen = if turning == 0.0 { 0.0 } else { turning * self.rate_gap };
+            along + motion.parameter_rate * across + unforeseen + FARTHEST_PLACE * rest
         };
         (0..n).map(|i| of_row(i).powi(2)).sum::<f64>().sqrt()
     }
@@ -104,6 +113,7 @@ pub(in super::super) fn prove_motion(
         .into_par_iter()
         .map(|i| Residuals::on_cell(governor, motion, plant, Interval::new(edge(i), edge(i + 1))))
         .collect();
+    let scheduling_state = description.scheduling.as_ref().map(|scheduling| scheduling.state);
     let largest = |of: fn(&Residuals) -> &Vec<Mat<f64>>| -> Vec<Mat<f64>> {
         let first = of(&cells[0]);
         let most = |k: usize, i: usize, j: usize| cells.iter().map(|cell| of(cell)[k][(i, j)]).fold(0.0, f64::max);
@@ -117,36 +127,44 @@ pub(in super::super) fn prove_motion(
     let mut proof = MotionProof {
         residuals: largest(|cell| &cell.along),
         rate_residuals: largest(|cell| &cell.across),
+        turning: largest(|cell| &cell.turning),
+        rate_gap: cells.iter().map(|cell| cell.rate_gap).fold(0.0, f64::max),
         rest: Mat::from_fn(description.states.len(), names.len(), |i, j| {
             cells.iter().map(|cell| cell.rest[(i, j)]).fold(0.0, f64::max)
         }),
         absorbed,
         claim: Claim {
-            claim: format!(
-                "the governed reference moves as the model does (moves of {} by up to {FARTHEST_MOVE}, of angles by half a turn)",
-                names.join(", ")
-            ),
-            verdict: Verdict::Undecided,
-            margin: f64::NAN,
-            detail: String::new(),
-            witness: None,
             cells: count,
-            seconds: 0.0,
+            ..Claim::new(
+                ClaimKind::GovernedMotion {
+                    states: names.iter().map(|name| (*name).to_owned()).collect(),
+                    farthest: FARTHEST_MOVE,
+                },
+                Of::Model,
+                &Words::default(),
+            )
         },
     };
-    let scheduling = description.scheduling.as_ref().map(|scheduling| scheduling.state);
     let of_state = |j: usize| {
         let farthest = if description.states[governor.set_point_states[j]].wraps { PI } else { FARTHEST_MOVE };
         let delta: Vec<f64> = (0..names.len()).map(|i| if i == j { farthest } else { 0.0 }).collect();
-        proof.disturbance(governor, motion, &delta, scheduling)
+        proof.disturbance(governor, motion, &delta, scheduling_state)
     };
     let disturbance = (0..names.len()).map(of_state).fold(0.0, f64::max);
     proof.claim.verdict = if disturbance < proof.absorbed { Verdict::Proved } else { Verdict::Undecided };
     proof.claim.margin = proof.absorbed - disturbance;
-    proof.claim.detail =
-        format!("residual at most {disturbance:.1e}, the sets absorb {:.1e}; {count} cells", proof.absorbed);
+    proof.claim.detail = format!(
+        "residual at most {}, the sets absorb {}; {count} cells",
+        at_most(disturbance),
+        at_least(proof.absorbed)
+    );
     let divided =
         |design: &Design| governor.authority_is_divided(&design.controller.limits, &design.controller.operating_input);
+    let rate = |design: &Design| design.rate_bounded.as_ref().map_or(0.0, |bounded| bounded.rate);
+    if !motion.inputs_by_rate.is_empty() && members.iter().any(|(design, _)| rate(design) > motion.parameter_rate) {
+        proof.claim.verdict = Verdict::Undecided;
+        proof.claim.detail = "the reference is for a smaller rate of the parameter than the design".into();
+    }
     if !members.iter().all(|(design, _)| divided(design)) {
         proof.claim.verdict = Verdict::Undecided;
         proof.claim.detail = "the reference's input and the feedback's limits together exceed the actuators".into();
@@ -159,6 +177,8 @@ pub(in super::super) fn prove_motion(
 struct Residuals {
     along: Vec<Mat<f64>>,
     across: Vec<Mat<f64>>,
+    turning: Vec<Mat<f64>>,
+    rate_gap: f64,
     /// A Z₀
     rest: Mat<f64>,
 }
@@ -179,21 +199,41 @@ impl Residuals {
                 (Interval::point(middle.value.magnitude()) + linear + half.square() * 0.5 * bend).hi()
             })
         };
-        let (n, d) = (plant.description().states.len(), governor.set_point_states.len());
+        let (n, m) = (plant.description().states.len(), plant.description().inputs.len());
+        let d = governor.set_point_states.len();
         let bounds = |middle: &[TaylorMatrix], over: &[TaylorMatrix]| {
             middle.iter().zip(over).map(|(middle, over)| bound(middle, over, n, d)).collect()
         };
         Self {
             along: bounds(&at_middle.along, &over.along),
             across: bounds(&at_middle.across, &over.across),
+            turning: bounds(&at_middle.turning, &over.turning),
+            rate_gap: rate_gap(&bound(&at_middle.flow_gap, &over.flow_gap, 1, n + m), motion),
             rest: Mat::from_fn(n, d, |i, j| over.rest.at(i, j).value.magnitude()),
         }
     }
 }
 
+/// Bound on the difference of the rates: of its row for states and inputs, with states anywhere and inputs within the actuators.
+fn rate_gap(row: &Mat<f64>, motion: &Motion) -> f64 {
+    let n = row.ncols() - motion.input_budget.len();
+    let of_input = |i: usize| match (row[(0, n + i)], motion.actuators.min[i], motion.actuators.max[i]) {
+        (0.0, _, _) => 0.0,
+        // a deviation from u*, which lies in between
+        (entry, Some(min), Some(max)) => entry * (max - min),
+        _ => f64::INFINITY,
+    };
+    let states: f64 = (0..n).map(|j| row[(0, j)] * FARTHEST_PLACE).sum();
+    // rounding of these sums is far below the part in a million that is added
+    (states + (0..motion.input_budget.len()).map(of_input).sum::<f64>()) * (1.0 + 1e-6)
+}
+
 struct Matrices {
     along: Vec<TaylorMatrix>,
     across: Vec<TaylorMatrix>,
+    turning: Vec<TaylorMatrix>,
+    /// The plant's row for ρ̇ less the governor's, 1 × (n + m).
+    flow_gap: TaylorMatrix,
     rest: TaylorMatrix,
 }
 
@@ -222,13 +262,21 @@ fn matrices(governor: &Governor, motion: &Motion, plant: &dyn Plant, rho: Taylor
             }
         })
         .collect();
+    let turning: Vec<TaylorMatrix> = motion.inputs_by_rate.iter().map(|v| b.times(&value(v))).collect();
     let across = (motion.states.iter().enumerate())
-        .map(|(k, z)| match motion.inputs_by_rate.get(k) {
-            Some(v) => slope(z).minus(&b.times(&value(v))),
+        .map(|(k, z)| match turning.get(k) {
+            Some(turning) => slope(z).minus(turning),
             None => slope(z),
         })
         .collect();
-    Matrices { along, across, rest }
+    let flow = motion.parameter_flow.as_ref().map(value);
+    let flow_gap = TaylorMatrix::from_fn(1, n + m, |_, j| match (description.scheduling.as_ref(), &flow) {
+        (Some(scheduling), Some(flow)) if j < n => a.at(scheduling.state, j) - flow.at(0, j),
+        (Some(scheduling), _) if j < n => a.at(scheduling.state, j),
+        (Some(scheduling), _) => b.at(scheduling.state, j - n),
+        (None, _) => Taylor::from(0.0),
+    });
+    Matrices { along, across, turning, flow_gap, rest }
 }
 
 /// q y^{3/2} √γ/(2κ) for the set of a design; zero where y could not be proved.
@@ -239,18 +287,19 @@ fn absorbed(design: &Design, level: f64, low: f64, high: f64) -> f64 {
     let positive = |middle: &TaylorMatrix, over: &TaylorMatrix, half: f64| {
         matches!(CellMatrix::new(middle, over).is_positive(half), Definiteness::Proved(_))
     };
-    let constant_is_positive = |matrix: &Mat<f64>| {
-        let matrix = TaylorMatrix::constant(matrix);
+    // a ≻ b, with the rounding of the difference
+    let is_more = |a: &Mat<f64>, b: &Mat<f64>| {
+        let matrix = TaylorMatrix::constant(a).minus(&TaylorMatrix::constant(b));
         positive(&matrix, &matrix, 0.0)
     };
-    if !constant_is_positive(&(&design.weights.q - identity(n, q))) {
+    if !is_more(&design.weights.q, &identity(n, q)) {
         return 0.0;
     }
     let y = match &design.rate_bounded {
         None => {
             let p = &design.points[0].p;
             let y = EIGENVALUE_SHARE * inverse_spd(p).map_or(0.0, |y| smallest_eigenvalue(&y));
-            if y > 0.0 && constant_is_positive(&(identity(n, 1.0 / y) - p)) { y } else { 0.0 }
+            if y > 0.0 && is_more(&identity(n, (1.0 / y).next_down()), p) { y } else { 0.0 }
         }
         Some(bounded) => {
             let edge = |i: usize| low + (high - low) * i as f64 / FIRST_CELLS as f64;

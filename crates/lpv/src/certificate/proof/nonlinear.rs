@@ -19,9 +19,10 @@
 use super::closed_loop::{ClosedLoop, Decrease, Parts, Place, Row};
 use super::difference::{Balance, Difference};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use super::{Attempt, COST_INFLATION, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH, Words};
-use crate::certificate::{Claim, Verdict};
+use super::{Attempt, COST_INFLATION, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH};
+use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Words};
 use crate::math::Mat;
+use crate::math::decimal::at_most;
 use crate::math::eigen::symmetric_eigenvectors;
 use crate::math::interval::Interval;
 use crate::math::matrix::{identity, quadratic_form};
@@ -103,8 +104,8 @@ pub(super) fn prove(
 ) -> (Vec<Claim>, Option<NonlinearProof>) {
     let started = Instant::now();
     let undecided = |reason: &str| {
-        let claim = "the nonlinear plant stays in a set x'P x <= c";
-        (vec![Claim::checked(claim, Verdict::Undecided, f64::NAN, reason)], None)
+        let kind = ClaimKind::Invariance { level: 0.0, motion: Motion::None };
+        (vec![Claim::new(kind, Of::Plant, words).decided(Verdict::Undecided, f64::NAN, reason)], None)
     };
     if !closed_loop.rests_at_every_parameter() {
         return undecided("the operating point moves with the parameter, or is not at rest");
@@ -112,7 +113,8 @@ pub(super) fn prove(
     let Some(unit) = closed_loop.unit_bounds() else { return undecided("the box around the set could not be proved") };
     let decreases = |level: f64, what: Decreases, least: f64| {
         let Some(remainder) = closed_loop.remainder(&unit.times(level.sqrt())) else {
-            return (Attempt::Open { t: 0.0, half: 1.0 }, 0, f64::INFINITY);
+            let place = Place { piece: 0, variant: 0, middle: 0.5, half: 0.5 };
+            return (Attempt::Open { place }, 0, f64::INFINITY);
         };
         let enclose = |place: &Place| closed_loop.nonlinear(place, &remainder, what);
         let judge = |cell: &NonlinearCell, half: f64| cell.is_decreasing(what, half);
@@ -123,6 +125,7 @@ pub(super) fn prove(
     };
     let invariant = Decreases { factor: 1.0, cost: 0.0 };
     let unsaturated = if closed_loop.mixtures() > 1 { f64::INFINITY } else { closed_loop.level_within_limits(&unit) };
+    let most_is_unsaturated = most.is_some();
     let most = most.unwrap_or(MOST_LEVEL).min(unit.most_level()).min(unsaturated);
     let proved =
         |level: f64, what: Decreases| matches!(decreases(level, what, LEAST_HALF_OF_SEARCH).0, Attempt::Proved(_));
@@ -132,30 +135,33 @@ pub(super) fn prove(
     let (attempt, cells, rate) = decreases(level, invariant, LEAST_HALF);
     let proof = NonlinearProof { level, radii: unit.times(level.sqrt()).finite(), rate };
     let names = &closed_loop.description().states;
-    let sizes = proof.radii.iter().map(|&(i, radius)| format!("|{}| <= {radius:.4} {}", names[i].name, names[i].unit));
+    let sizes =
+        proof.radii.iter().map(|&(i, radius)| format!("|{}| <= {} {}", names[i].name, at_most(radius), names[i].unit));
     let mut sizes: Vec<String> = sizes.collect();
     if closed_loop.has_parameter {
-        sizes.push(format!("{} <= {rate:.4} {}", words.rate, words.unit));
+        sizes.push(format!("|d{}/dt| <= {} {}/s", words.parameter, at_most(rate), words.unit));
     }
-    let claim = format!("the nonlinear plant: x'P x <= {level:.6} is invariant{}", words.every);
-    let mut claims = vec![words.claim(claim, attempt, closed_loop, cells, started)];
+    // of the plant's own parameter: whatever it does in the set
+    let motion = Motion::None;
+    let mut premises = vec!["lyapunov-definite"];
+    if most_is_unsaturated {
+        premises.push("unsaturated");
+    }
+    let decided = |kind, attempt, cells, started| {
+        let claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&premises);
+        // the statement is about the plant
+        Claim { claim: Claim::new(claim.kind.clone(), Of::Plant, words).claim, ..claim.of_plant() }
+    };
+    let invariance = ClaimKind::Invariance { level, motion };
+    let mut claims = vec![decided(invariance, attempt, cells, started)];
     claims[0].detail = format!("{}; {}", sizes.join(", "), claims[0].detail);
 
     let started = Instant::now();
     let cost = Decreases { factor: COST_INFLATION, cost: 1.0 };
-    let within = largest_level(level, |level| proved(level, cost));
-    let (attempt, cells, _) = decreases(within.unwrap_or(LEAST_LEVEL * level), cost, LEAST_HALF);
-    let claim = format!(
-        "the nonlinear plant: the cost is at most {COST_INFLATION} x(0)'P x(0) from x'P x <= {:.6}{}",
-        within.unwrap_or(LEAST_LEVEL * level),
-        words.every
-    );
-    let mut claim = words.claim(claim, attempt, closed_loop, cells, started);
-    if claim.verdict == Verdict::Refuted {
-        // only the bound on what linearisation leaves out says so
-        claim = Claim { verdict: Verdict::Undecided, witness: None, margin: f64::NAN, ..claim };
-    }
-    claims.push(claim);
+    let within = largest_level(level, |level| proved(level, cost)).unwrap_or(LEAST_LEVEL * level);
+    let (attempt, cells, _) = decreases(within, cost, LEAST_HALF);
+    let kind = ClaimKind::Cost { factor: COST_INFLATION, level: Some(within), motion };
+    claims.push(decided(kind, attempt, cells, started).resting_on(&["weights"]));
     (claims, Some(proof))
 }
 
@@ -301,15 +307,16 @@ impl ClosedLoop<'_> {
             for (square, row) in squares.iter_mut().zip(&rows) {
                 let value = match *row {
                     Row::State(i) => y[(i, i)],
-                    Row::Input(i) => quadratic_form(&y, &(0..n).map(|j| f[(i, j)]).collect::<Vec<f64>>()),
+                    Row::Input(i) | Row::Limited(i) => {
+                        quadratic_form(&y, &(0..n).map(|j| f[(i, j)]).collect::<Vec<f64>>())
+                    }
                 };
                 *square = square.max(value);
             }
         }
-        let saturates = self.mixtures() > 1;
         let bound = |(row, square): (&Row, &f64)| match *row {
             // the gain that flies is another
-            Row::Input(_) if saturates => f64::INFINITY,
+            Row::Input(i) if self.may_saturate(i) => f64::INFINITY,
             _ => BOX_SLACK * square.sqrt(),
         };
         let bounds: Vec<f64> = rows.iter().zip(&squares).map(bound).collect();

@@ -13,8 +13,12 @@
 //! its corners.
 
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use crate::certificate::{Claim, Verdict, Witness};
+use super::weights;
+use super::witness::{Broken, Loop, form, image, inverse};
+use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Witness, Words, settle};
 use crate::math::Mat;
+use crate::math::decimal::at_least;
+use crate::math::definite::asymmetry;
 use crate::math::interval::Interval;
 use crate::math::matrix::symmetric_part;
 use crate::math::taylor::Taylor;
@@ -47,6 +51,16 @@ pub enum PolytopicLyapunov {
     },
 }
 
+impl PolytopicLyapunov {
+    /// P, or the Yᵢ.
+    fn matrices(&self) -> &[Mat<f64>] {
+        match self {
+            Self::Common { p, .. } => std::slice::from_ref(p),
+            Self::ParameterDependent { y, .. } => y,
+        }
+    }
+}
+
 /// What is to be proved over a polytope.
 #[derive(Clone, Debug)]
 pub struct PolytopicClaim {
@@ -69,25 +83,31 @@ pub struct PolytopicClaim {
 /// If sizes do not fit.
 pub fn prove_polytopic(claim: &PolytopicClaim) -> Vec<Claim> {
     let sums = Sums::new(claim);
-    let mut claims = vec![sums.definite()];
-    if let Some(bounds) = &claim.saturation {
-        claims.push(sums.unsaturated(bounds));
+    let motion = sums.motion();
+    let mut claims: Vec<Claim> = claim.weights.iter().map(|given| weights::claim(given, &words())).collect();
+    claims.push(sums.definite());
+    let level = sums.limited_rows().first().and(claim.saturation.as_ref()).map(|bounds| bounds.gamma);
+    if let Some(level) = level {
+        claims.push(sums.unsaturated(level));
     }
-    let what = match &claim.saturation {
-        Some(bounds) => format!("the set V <= {} is invariant", bounds.gamma),
-        None => "V decreases".into(),
+    let decrease = match level {
+        Some(level) => ClaimKind::Invariance { level, motion },
+        None => ClaimKind::Decrease { motion },
     };
-    claims.push(sums.decrease(&format!("{what}{}", sums.every()), 1.0, None));
+    claims.push(sums.decrease(decrease, level, None));
     if let Some(weights) = &claim.weights {
-        let of_factor = |factor: f64| {
-            let words = format!("the cost is at most {factor} V(x(0)){}", sums.every());
-            sums.decrease(&words, factor, Some(weights))
-        };
+        let of_factor =
+            |factor: f64| sums.decrease(ClaimKind::Cost { factor, level, motion }, level, Some((factor, weights)));
         let attempts: Vec<Claim> = COST_FACTORS.into_iter().map(of_factor).collect();
         let proved = attempts.iter().position(|claim| claim.verdict == Verdict::Proved).unwrap_or(0);
         claims.extend(attempts.into_iter().nth(proved));
     }
+    settle(&mut claims);
     claims
+}
+
+fn words() -> Words {
+    Words { lyapunov: "V", ..Words::default() }
 }
 
 /// Everything of a claim as interval matrices.
@@ -106,10 +126,12 @@ struct Sums<'a> {
 /// A matrix that has to be definite.
 struct Condition {
     matrix: TaylorMatrix,
-    /// What is refuted if this is not definite: the claim itself at these convex weights and rates.
+    /// The same quadratic form at these convex weights and rates, where this one is of a pair.
     at: TaylorMatrix,
     weights: Vec<f64>,
     rates: Vec<f64>,
+    /// Bits of the inputs that fly K.
+    mixture: usize,
 }
 
 impl<'a> Sums<'a> {
@@ -125,7 +147,7 @@ impl<'a> Sums<'a> {
             PolytopicLyapunov::ParameterDependent { y, l, rate_vertices } => {
                 let y: Vec<TaylorMatrix> = y.iter().map(symmetric).collect();
                 // any M with F = M(ρ)Y(ρ)⁻¹ will do: the one of these numbers
-                let auxiliary = f.map(|f| f.iter().zip(&y).map(|(f, y)| f.times(y)).collect());
+                let auxiliary = f.map(|f| f.iter().zip(&y).map(|(f, y)| f.times(y)).collect::<Vec<_>>());
                 Self { claim, lyapunov: y, gain: all(l), auxiliary, rates: rate_vertices.clone() }
             }
         }
@@ -139,12 +161,35 @@ impl<'a> Sums<'a> {
         matches!(self.claim.lyapunov, PolytopicLyapunov::Common { .. })
     }
 
-    fn every(&self) -> &'static str {
+    fn motion(&self) -> Motion {
         match (self.len(), self.is_common()) {
-            (1, _) => "",
-            (_, true) => " for every motion of the parameter in the polytope",
-            (_, false) => " for every motion of the parameter in the polytope with rates in the hull of rate_vertices",
+            (1, _) => Motion::None,
+            (_, true) => Motion::Any,
+            (_, false) => Motion::Hull,
         }
+    }
+
+    /// σ of input `i`; infinite where it is not limited.
+    fn sigma(&self, i: usize) -> f64 {
+        self.claim.saturation.as_ref().map_or(f64::INFINITY, |bounds| bounds.sigma[i])
+    }
+
+    /// The inputs that may saturate: limited, of a high gain.
+    fn saturating(&self) -> Vec<usize> {
+        let inputs = self.claim.polytope.inputs();
+        (0..inputs).filter(|&i| self.auxiliary.is_some() && self.sigma(i).is_finite()).collect()
+    }
+
+    /// The limited inputs that the low gain moves at some vertex: rows of zeros never reach a limit.
+    fn limited_rows(&self) -> Vec<usize> {
+        let (inputs, n) = (self.claim.polytope.inputs(), self.claim.polytope.states());
+        let moves = |i: usize| (0..self.len()).any(|k| (0..n).any(|j| !self.low(i)[k].at(i, j).is_zero()));
+        (0..inputs).filter(|&i| self.sigma(i).is_finite() && moves(i)).collect()
+    }
+
+    /// The gain whose row `i` is not to saturate.
+    fn low(&self, i: usize) -> &[TaylorMatrix] {
+        self.auxiliary.as_ref().filter(|_| self.sigma(i).is_finite()).unwrap_or(&self.gain)
     }
 
     fn vertex(&self, i: usize) -> Vec<f64> {
@@ -157,58 +202,156 @@ impl<'a> Sums<'a> {
             at: matrix.clone(),
             weights: self.vertex(i),
             rates: Vec::new(),
+            mixture: 0,
         };
+        if self.claim.lyapunov.matrices().iter().any(|matrix| asymmetry(matrix).is_some()) {
+            // V is not a quadratic form of these numbers
+            let claim = Claim::new(ClaimKind::LyapunovDefinite, Of::Model, &words());
+            return claim.decided(Verdict::Undecided, f64::NAN, "P or Y is not symmetric to the last digit");
+        }
         let conditions: Vec<Condition> = self.lyapunov.iter().enumerate().map(at).collect();
-        decide("P is positive definite", Instant::now(), &conditions)
+        decide(ClaimKind::LyapunovDefinite, Instant::now(), &conditions, |condition, direction, value| {
+            Some(condition.witness(self.state(&condition.weights, direction), value))
+        })
     }
 
-    /// [σ²/γ, f; fᵀ, P] ≻ 0 at every vertex, which is affine in ρ.
-    fn unsaturated(&self, bounds: &InputBounds) -> Claim {
-        let low = self.auxiliary.as_ref().unwrap_or(&self.gain);
+    /// [1/γ, f/σ; fᵀ/σ, P] ≻ 0 at every vertex, which is affine in ρ.
+    fn unsaturated(&self, gamma: f64) -> Claim {
         let n = self.claim.polytope.states();
-        let conditions = (0..self.len()).flat_map(|i| (0..bounds.sigma.len()).map(move |input| (i, input)));
+        let rows = self.limited_rows();
+        let conditions = (0..self.len()).flat_map(|i| rows.iter().map(move |&input| (i, input)));
         let conditions = conditions.map(|(i, input)| {
-            let matrix = &self.lyapunov[i.min(self.lyapunov.len() - 1)];
-            let square = Interval::point(bounds.sigma[input]).square() / bounds.gamma;
+            let matrix = self.lyapunov(i);
+            let sigma = Taylor::constant(Interval::point(self.sigma(input)));
+            let row = |c: usize| self.low(input)[i].at(input, c) / sigma;
             let bordered = TaylorMatrix::from_fn(n + 1, n + 1, |r, c| match (r, c) {
-                (0, 0) => Taylor::constant(square),
-                (0, c) => low[i].at(input, c - 1),
-                (r, 0) => low[i].at(input, r - 1),
+                (0, 0) => Taylor::constant(Interval::point(1.0) / gamma),
+                (0, c) => row(c - 1),
+                (r, 0) => row(r - 1),
                 (r, c) => matrix.at(r - 1, c - 1),
             });
-            Condition { at: bordered.clone(), matrix: bordered, weights: self.vertex(i), rates: Vec::new() }
+            Condition { at: bordered.clone(), matrix: bordered, weights: self.vertex(i), rates: Vec::new(), mixture: 0 }
         });
-        decide(
-            &format!("the low gain does not saturate on V <= {}", bounds.gamma),
-            Instant::now(),
-            &conditions.collect::<Vec<_>>(),
-        )
+        let conditions: Vec<Condition> = conditions.collect();
+        let kind = ClaimKind::Unsaturated { level: gamma };
+        // the multiple of the direction with V = γ passes the limit, see `witness`
+        decide(kind, Instant::now(), &conditions, |condition, direction, value| {
+            Some(condition.witness(self.state(&condition.weights, direction.get(1..)?), value))
+        })
+        .resting_on(&["lyapunov-definite"])
     }
 
     /// κM − (cost) ≻ 0 for vertices, pairs, rates and mixtures.
-    fn decrease(&self, words: &str, factor: f64, cost: Option<&CostWeights>) -> Claim {
+    fn decrease(&self, kind: ClaimKind, level: Option<f64>, cost: Option<(f64, &CostWeights)>) -> Claim {
         let started = Instant::now();
-        let mixtures = if self.auxiliary.is_some() { 1 << self.claim.polytope.inputs() } else { 1 };
+        let (factor, weights) = cost.map_or((1.0, None), |(factor, weights)| (factor, Some(weights)));
+        let saturating = self.saturating();
         let mut conditions = Vec::new();
-        for mixture in 0..mixtures {
-            let s = self.mixed(mixture);
+        for mixture in 0..1_usize << saturating.len() {
+            let s = self.mixed(mixture, &saturating);
             for rates in &self.rates {
                 for i in 0..self.len() {
                     for j in i..self.len() {
-                        conditions.push(self.pair([i, j], &s, rates, factor, cost));
+                        conditions.push(Condition { mixture, ..self.pair([i, j], &s, rates, factor, weights) });
                     }
                 }
             }
         }
-        decide(words, started, &conditions)
+        let all_of_k = (1_usize << saturating.len()) - 1;
+        let claim = decide(kind, started, &conditions, |condition, direction, value| match cost {
+            // a mixture of rows is no motion
+            None if condition.mixture == all_of_k => self.leaves(condition, direction, value, level),
+            None => None,
+            Some((factor, weights)) => self.costs_more(condition, factor, weights),
+        });
+        let mut premises = vec!["lyapunov-definite"];
+        premises.extend(weights.map(|_| "weights"));
+        premises.extend(level.map(|_| "unsaturated"));
+        premises.extend(level.and(weights).map(|_| "invariance"));
+        claim.resting_on(&premises)
+    }
+
+    /// The state that a direction of a condition's matrix stands for: itself, or Y(ρ)z.
+    fn state(&self, weights: &[f64], direction: &[f64]) -> Vec<f64> {
+        match self.claim.lyapunov {
+            PolytopicLyapunov::Common { .. } => direction.to_vec(),
+            PolytopicLyapunov::ParameterDependent { .. } => {
+                image(&self.mean(&self.lyapunov, weights), direction).into_iter().map(Interval::middle).collect()
+            }
+        }
+    }
+
+    /// Σ ρᵢMᵢ.
+    fn mean(&self, matrices: &[TaylorMatrix], weights: &[f64]) -> TaylorMatrix {
+        if matrices.len() == 1 {
+            return matrices[0].clone();
+        }
+        let (rows, columns) = matrices[0].shape();
+        TaylorMatrix::from_fn(rows, columns, |i, j| {
+            let terms = matrices.iter().zip(weights).filter(|&(_, &weight)| weight != 0.0);
+            terms.fold(Taylor::from(0.0), |sum, (matrix, &weight)| sum + matrix.at(i, j) * weight)
+        })
+    }
+
+    /// The witness that V grows at these weights and rates: where there is a level, on the edge of the set with no input at its limit.
+    fn leaves(&self, condition: &Condition, direction: &[f64], value: f64, level: Option<f64>) -> Option<Witness> {
+        let size = form(&self.mean(&self.lyapunov, &condition.weights), direction);
+        if let Some(level) = level {
+            let inputs = image(&self.mean(&self.gain, &condition.weights), direction);
+            let stays = |(i, input): (usize, &Interval)| {
+                let [square, bound] = [input.magnitude(), self.sigma(i)].map(|x| Interval::point(x).square());
+                !self.sigma(i).is_finite() || (square * level).hi() < (bound * size.lo()).lo()
+            };
+            if size.lo() <= 0.0 || !inputs.iter().enumerate().all(stays) {
+                return None;
+            }
+        }
+        let scale = level.map_or(1.0, |level| (level / size.middle()).sqrt());
+        let state = self.state(&condition.weights, direction).iter().map(|x| scale * x).collect();
+        Some(condition.witness(state, value))
+    }
+
+    /// The witness that a motion at rest at these weights costs more than `factor` V(x(0)).
+    fn costs_more(&self, condition: &Condition, factor: f64, weights: &CostWeights) -> Option<Witness> {
+        if !self.allows_rest() {
+            return None;
+        }
+        let (polytope, at) = (&self.claim.polytope, &condition.weights);
+        let all = |of: &dyn Fn(usize) -> TaylorMatrix| (0..self.len()).map(of).collect::<Vec<_>>();
+        let a = self.mean(&all(&|i| TaylorMatrix::constant(polytope.a(i))), at);
+        let b = self.mean(&all(&|i| TaylorMatrix::constant(polytope.b(i))), at);
+        let (matrix, gain) = (self.mean(&self.lyapunov, at), self.mean(&self.gain, at));
+        let (p, k) = match self.is_common() {
+            true => (matrix, gain),
+            false => {
+                let p = inverse(&matrix)?;
+                let k = gain.times(&p);
+                (p, k)
+            }
+        };
+        let motion = Loop {
+            flow: a.minus(&b.times(&k)),
+            stage: k.quadratic(&weights.r).plus(&TaylorMatrix::constant(&weights.q)),
+            lyapunov: p,
+            limited: (0..polytope.inputs()).any(|i| self.sigma(i).is_finite()),
+        };
+        let Broken { state, value } = motion.exceeds_cost(factor)?;
+        Some(Witness { vertex_weights: at.clone(), state, value, ..Witness::default() })
+    }
+
+    /// Whether ρ̇ = 0 is certainly among the rates.
+    fn allows_rest(&self) -> bool {
+        let is_opposite = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(x, y)| *x == -*y);
+        self.rates.iter().any(|a| self.rates.iter().any(|b| is_opposite(a, b)))
     }
 
     /// Rows of K (bit set) and of F, or of L and FY.
-    fn mixed(&self, mixture: usize) -> Vec<TaylorMatrix> {
+    fn mixed(&self, mixture: usize, saturating: &[usize]) -> Vec<TaylorMatrix> {
         let Some(low) = &self.auxiliary else { return self.gain.clone() };
         let (m, n) = (self.claim.polytope.inputs(), self.claim.polytope.states());
+        let is_low = |i: usize| saturating.iter().position(|&s| s == i).is_some_and(|bit| mixture >> bit & 1 == 0);
         let row = |(k, f): (&TaylorMatrix, &TaylorMatrix)| {
-            TaylorMatrix::from_fn(m, n, |i, j| if mixture >> i & 1 == 1 { k.at(i, j) } else { f.at(i, j) })
+            TaylorMatrix::from_fn(m, n, |i, j| if is_low(i) { f.at(i, j) } else { k.at(i, j) })
         };
         self.gain.iter().zip(low).map(row).collect()
     }
@@ -273,49 +416,51 @@ impl<'a> Sums<'a> {
             at = less(ii.plus(&jj).plus(&both), 1.0);
             matrix = less(both, 0.5);
         }
-        Condition { matrix, at, weights: halfway, rates: rates_of_claim }
+        Condition { matrix, at, weights: halfway, rates: rates_of_claim, mixture: 0 }
     }
 }
 
-/// Proved if every condition is; refuted if one is false where it is the claim itself.
-fn decide(words: &str, started: Instant, conditions: &[Condition]) -> Claim {
+impl Condition {
+    fn witness(&self, state: Vec<f64>, value: f64) -> Witness {
+        let (vertex_weights, vertex_rates) = (self.weights.clone(), self.rates.clone());
+        Witness { vertex_weights, vertex_rates, state, value, ..Witness::default() }
+    }
+}
+
+/// Proved if every condition is; refuted if one is false and `witness` makes of its direction a motion that breaks the claim.
+fn decide(
+    kind: ClaimKind,
+    started: Instant,
+    conditions: &[Condition],
+    witness: impl Fn(&Condition, &[f64], f64) -> Option<Witness>,
+) -> Claim {
     let verdict_of = |matrix: &TaylorMatrix| CellMatrix::new(matrix, matrix).is_positive(0.0);
-    let place = |condition: &Condition| {
-        let rates =
-            if condition.rates.is_empty() { String::new() } else { format!(" with rates {:?}", condition.rates) };
-        format!("at vertex weights {:?}{rates}", condition.weights)
-    };
-    let mut claim = Claim::checked(words, Verdict::Proved, f64::INFINITY, "");
+    let mut claim = Claim::new(kind, Of::Model, &words()).decided(Verdict::Proved, f64::INFINITY, "");
     claim.cells = conditions.len();
     for condition in conditions {
-        match verdict_of(&condition.matrix) {
+        if let Definiteness::Proved(margin) = verdict_of(&condition.matrix) {
             // NaN of an undecided one stays
-            Definiteness::Proved(margin) if claim.margin >= margin => claim.margin = margin,
-            Definiteness::Proved(_) => {}
-            _ => match verdict_of(&condition.at) {
-                Definiteness::Refuted { direction, value } => {
-                    claim.verdict = Verdict::Refuted;
-                    claim.margin = value;
-                    claim.detail = format!("fails {}", place(condition));
-                    claim.witness = Some(Witness {
-                        vertex_weights: condition.weights.clone(),
-                        vertex_rates: condition.rates.clone(),
-                        state: direction,
-                        value,
-                        ..Witness::default()
-                    });
-                    break;
-                }
-                _ => {
-                    claim.verdict = Verdict::Undecided;
-                    claim.margin = f64::NAN;
-                    claim.detail = format!("neither proved nor refuted {}", place(condition));
-                }
-            },
+            if claim.margin >= margin {
+                claim.margin = margin;
+            }
+            continue;
+        }
+        let rates = match condition.rates.is_empty() {
+            true => String::new(),
+            false => format!(" with rates {:?}", condition.rates),
+        };
+        claim.verdict = Verdict::Undecided;
+        claim.margin = f64::NAN;
+        claim.detail = format!("neither proved nor refuted at vertex weights {:?}{rates}", condition.weights);
+        if let Definiteness::Refuted { direction, value } = verdict_of(&condition.at) {
+            claim = claim.refuted_by(witness(condition, &direction, value));
+        }
+        if claim.verdict == Verdict::Refuted {
+            break;
         }
     }
     if claim.verdict == Verdict::Proved {
-        claim.detail = format!("relative margin {:.1e}, {} matrices", claim.margin, claim.cells);
+        claim.detail = format!("relative margin {}, {} matrices", at_least(claim.margin), claim.cells);
     }
     claim.seconds = started.elapsed().as_secs_f64();
     claim

@@ -14,7 +14,7 @@ use super::closed_loop::{ClosedLoop, Form, Place, Row};
 use super::matrix::CellMatrix;
 use super::polytopic::{PolytopicClaim, PolytopicLyapunov};
 use super::{Attempt, Cells, LEAST_HALF, Proofs, Unprovable, decrease, sampled};
-use crate::certificate::{Claim, SupervisedProofs, Verdict};
+use crate::certificate::{Claim, ClaimKind, Motion, Of, SupervisedProofs, Verdict};
 use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
 use crate::math::interval::Interval;
@@ -57,27 +57,17 @@ pub struct Record {
     claims: Vec<Value>,
 }
 
-/// What a claim says, as far as the record asks.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Said {
-    Definite,
-    Unsaturated,
-    Decrease,
-    Cost,
-    Sampled,
-}
+/// Kinds of claims of the record, and the names of the certificate's claims that they hold.
+const DEFINITE: (&str, &[&str]) = ("definite", &["lyapunov-definite"]);
+const UNSATURATED: (&str, &[&str]) = ("unsaturated", &["unsaturated"]);
+const DECREASE: (&str, &[&str]) = ("decrease", &["decrease", "invariance"]);
+const COST: (&str, &[&str]) = ("cost", &["cost"]);
+const SAMPLED: (&str, &[&str]) = ("sampled", &["sampled-stability"]);
 
-/// Whether `claims` say it, and it is proved.
-fn is_proved(claims: &[Claim], said: Said) -> bool {
-    let beginnings: &[&str] = match said {
-        Said::Definite => &["P is positive definite"],
-        Said::Unsaturated => &["the low gain does not saturate"],
-        Said::Decrease => &["the set x'P x", "x'P x decreases", "the set V", "V decreases"],
-        Said::Cost => &["the cost is at most"],
-        Said::Sampled => &["the loop sampled"],
-    };
-    let says = |claim: &&Claim| beginnings.iter().any(|beginning| claim.claim.starts_with(beginning));
-    claims.iter().filter(says).any(|claim| claim.verdict == Verdict::Proved)
+/// The proved claim of this kind about the model.
+fn proved<'c>(claims: &'c [Claim], (_, names): (&str, &[&str])) -> Option<&'c Claim> {
+    let is_it = |claim: &&Claim| names.contains(&claim.id.name) && claim.of == Of::Model;
+    claims.iter().filter(is_it).find(|claim| claim.verdict == Verdict::Proved)
 }
 
 impl Record {
@@ -125,34 +115,34 @@ impl Record {
             object(json!({"design": at, "kind": kind, "premises": premises, "groups": groups}))
         };
         let mut premises = Vec::new();
-        if is_proved(&proofs.claims, Said::Definite) {
-            premises.push(self.add("claim", claim("definite", &[], definite(closed_loop)?))?);
+        if proved(&proofs.claims, DEFINITE).is_some() {
+            premises.push(self.add("claim", claim(DEFINITE.0, &[], definite(closed_loop)?))?);
         }
-        if let (Some(level), true) = (proofs.level, is_proved(&proofs.claims, Said::Unsaturated)) {
-            let mut value = claim("unsaturated", &premises, unsaturated(closed_loop, design, level)?);
+        if let (Some(level), Some(_)) = (proofs.level, proved(&proofs.claims, UNSATURATED)) {
+            let mut value = claim(UNSATURATED.0, &premises, unsaturated(closed_loop, level)?);
             value.insert("level".into(), json!(level));
             premises.push(self.add("claim", value)?);
         }
         let mut cost = None;
-        if premises.len() == 1 + usize::from(proofs.level.is_some()) {
-            for (kind, said, reached, factor, share) in [
-                ("decrease", Said::Decrease, proofs.stable_up_to, 1.0, 0.0),
-                ("cost", Said::Cost, proofs.cost_up_to, proofs.cost_factor, 1.0),
-            ] {
-                let Some(rate) = reached.filter(|_| is_proved(&proofs.claims, said)) else { break };
-                let mut value = claim(kind, &premises, falling(closed_loop, rate, factor, share)?);
-                value.insert("rate".into(), json!(rate));
-                value.insert("level".into(), json!(proofs.level));
-                if share > 0.0 {
-                    value.insert("factor".into(), json!(factor));
-                }
-                let number = self.add("claim", value)?;
-                premises.push(number);
-                cost = (share > 0.0).then_some(number);
+        let needed = 1 + usize::from(proofs.level.is_some());
+        for (place, kind) in [DECREASE, COST].into_iter().enumerate() {
+            let Some(found) = proved(&proofs.claims, kind).filter(|_| premises.len() == needed + place) else { break };
+            let (rate, factor) = match found.kind {
+                ClaimKind::Decrease { motion } | ClaimKind::Invariance { motion, .. } => (rate_of(motion), None),
+                ClaimKind::Cost { motion, factor, .. } => (rate_of(motion), Some(factor)),
+                _ => break,
+            };
+            let mut value = claim(kind.0, &premises, falling(closed_loop, rate, factor)?);
+            value.extend(object(json!({"rate": rate, "level": proofs.level})));
+            if let Some(factor) = factor {
+                value.insert("factor".into(), json!(factor));
             }
+            let number = self.add("claim", value)?;
+            premises.push(number);
+            cost = factor.map(|_| number);
         }
-        if is_proved(&proofs.claims, Said::Sampled) {
-            let mut value = claim("sampled", &[], sampled_cells(closed_loop, design.sample_time_s)?);
+        if proved(&proofs.claims, SAMPLED).is_some() {
+            let mut value = claim(SAMPLED.0, &[], sampled_cells(closed_loop, design.sample_time_s)?);
             value.insert("sample_time_s".into(), json!(design.sample_time_s));
             self.add("claim", value)?;
         }
@@ -183,26 +173,20 @@ impl Record {
             }
         }
         let at = self.add("polytope", value)?;
-        let level = claim.saturation.as_ref().map(|bounds| bounds.gamma);
-        let factor = cost_factor(claims);
         let mut premises: Vec<usize> = Vec::new();
-        for (kind, said) in [
-            ("definite", Said::Definite),
-            ("unsaturated", Said::Unsaturated),
-            ("decrease", Said::Decrease),
-            ("cost", Said::Cost),
-        ] {
-            if kind == "unsaturated" && level.is_none() {
-                continue;
-            }
-            if !is_proved(claims, said) {
-                break;
-            }
-            let mut value = object(json!({"design": at, "kind": kind, "premises": premises}));
-            if kind != "definite" {
+        let is_claimed = |kind: &(&str, &[&str])| claims.iter().any(|claim| kind.1.contains(&claim.id.name));
+        for kind in [DEFINITE, UNSATURATED, DECREASE, COST].into_iter().filter(is_claimed) {
+            let Some(found) = proved(claims, kind) else { break };
+            let mut value = object(json!({"design": at, "kind": kind.0, "premises": premises}));
+            let (level, factor) = match found.kind {
+                ClaimKind::Unsaturated { level } | ClaimKind::Invariance { level, .. } => (Some(level), None),
+                ClaimKind::Cost { level, factor, .. } => (level, Some(factor)),
+                _ => (None, None),
+            };
+            if kind != DEFINITE {
                 value.insert("level".into(), json!(level));
             }
-            if kind == "cost" {
+            if let Some(factor) = factor {
                 value.insert("factor".into(), json!(factor));
             }
             premises.push(self.add("claim", value)?);
@@ -237,10 +221,12 @@ impl Record {
     }
 }
 
-/// κ of the words of a claim over a polytope.
-fn cost_factor(claims: &[Claim]) -> Option<f64> {
-    let words = |claim: &Claim| claim.claim.strip_prefix("the cost is at most ").map(str::to_owned);
-    claims.iter().find_map(words).and_then(|rest| rest.split(' ').next()?.parse().ok())
+/// Largest rate of the parameter.
+fn rate_of(motion: Motion) -> f64 {
+    match motion {
+        Motion::Bounded { rate } => rate,
+        _ => 0.0,
+    }
 }
 
 fn object(value: Value) -> Map<String, Value> {
@@ -347,25 +333,28 @@ fn definite(closed_loop: &ClosedLoop) -> Result<Vec<Value>, RecordError> {
     Ok(groups(&cells, |_| Value::Null, |_, _| ()))
 }
 
-fn unsaturated(closed_loop: &ClosedLoop, design: &Design, level: f64) -> Result<Vec<Value>, RecordError> {
-    let limits = &design.controller.limits;
-    let sigma = limits.symmetric_bound(&design.controller.operating_input).unwrap_or_default();
-    let mut cells = Cells::new(closed_loop.pieces, sigma.len(), |place: &Place| {
-        let bound = Interval::point(sigma[place.variant]) * sigma[place.variant] / level;
-        closed_loop.bordered(place, Some((Row::Input(place.variant), bound)))
+fn unsaturated(closed_loop: &ClosedLoop, level: f64) -> Result<Vec<Value>, RecordError> {
+    let rows = closed_loop.limited_rows();
+    let mut cells = Cells::new(closed_loop.pieces, rows.len(), |place: &Place| {
+        closed_loop.bordered(place, Some((Row::Limited(rows[place.variant]), Interval::point(1.0) / level)))
     });
     let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
     found(&attempt, "the low gain does not saturate")?;
-    Ok(groups(&cells, |place| json!(place.variant), |_, _| ()))
+    Ok(groups(&cells, |place| json!(rows[place.variant]), |_, _| ()))
 }
 
-/// Of the decrease, or of the cost with `share` 1. The variant is the list of inputs that fly K, the others flying F.
-fn falling(closed_loop: &ClosedLoop, rate: f64, factor: f64, share: f64) -> Result<Vec<Value>, RecordError> {
+/// Of the decrease, or with a factor of the cost. The variant is the list of inputs that may saturate and fly K, the others of them
+/// flying F.
+fn falling(closed_loop: &ClosedLoop, rate: f64, factor: Option<f64>) -> Result<Vec<Value>, RecordError> {
     let mut cells = Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place| closed_loop.decrease(place));
-    found(&decrease(&mut cells, LEAST_HALF, rate, factor, share), "V decreases")?;
-    let flying = |place: &Place| match closed_loop.auxiliary {
-        None => Value::Null,
-        Some(_) => json!((0..closed_loop.inputs()).filter(|i| place.variant >> i & 1 == 1).collect::<Vec<_>>()),
+    let share = if factor.is_some() { 1.0 } else { 0.0 };
+    found(&decrease(&mut cells, LEAST_HALF, rate, factor.unwrap_or(1.0), share), "V decreases")?;
+    let saturating = closed_loop.saturating();
+    let flying = |place: &Place| match saturating.is_empty() {
+        true => Value::Null,
+        false => json!(
+            (0..saturating.len()).filter(|i| place.variant >> i & 1 == 1).map(|i| saturating[i]).collect::<Vec<_>>()
+        ),
     };
     Ok(groups(&cells, flying, |_, _| ()))
 }

@@ -7,8 +7,8 @@
 
 use super::closed_loop::{ClosedLoop, Place};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use super::{Attempt, Cells, LEAST_HALF, Words};
-use crate::certificate::Claim;
+use super::{Attempt, Cells, LEAST_HALF};
+use crate::certificate::claim::{Claim, ClaimKind, Words};
 use crate::math::Mat;
 use crate::math::hold::discretize;
 use crate::math::interval::Interval;
@@ -31,11 +31,10 @@ pub(super) struct SampledCell {
 pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, sample_time_s: f64) -> Claim {
     let started = Instant::now();
     let (cells, attempt) = prove_cells(closed_loop, sample_time_s);
-    let fixed = if closed_loop.has_parameter { format!("{}, fixed", words.every) } else { String::new() };
-    let claim = format!("the loop sampled with zero-order hold is stable at T = {sample_time_s} s{fixed}");
-    let mut claim = words.claim(claim, attempt.clone(), closed_loop, cells.len(), started);
-    if let Attempt::Open { t, .. } = attempt {
-        claim.detail = format!("no proof was found around parameter {:.6}", closed_loop.parameter(t));
+    let kind = ClaimKind::SampledStability { sample_time_s };
+    let mut claim = words.claim(kind, attempt.clone(), closed_loop, cells.len(), started);
+    if let Attempt::Open { place } = attempt {
+        claim.detail = format!("no proof was found around parameter {:.6}", closed_loop.parameter(place.middle));
     }
     claim
 }

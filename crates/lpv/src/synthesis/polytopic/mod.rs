@@ -51,7 +51,7 @@ pub enum Lyapunov {
 /// |uᵢ| ≤ σᵢ, and the level of the set {x: V ≤ γ} on which the design is to hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InputBounds {
-    /// σᵢ > 0, one for each input.
+    /// σᵢ > 0, one for each input; infinite where one is not limited (of a certificate; synthesis asks for limits).
     pub sigma: Vec<f64>,
     /// γ > 0
     pub gamma: f64,
