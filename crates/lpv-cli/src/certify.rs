@@ -9,7 +9,8 @@ use crate::scenario::door::Door;
 use crate::scenario::read_text;
 use clap::Args;
 use lpv::certificate::{
-    Claim, ClaimKind, Member, Of, ProofOptions, Verdict, Words, check, merged, prove_supervised, worst,
+    Claim, ClaimKind, Member, Of, ProofOptions, Record, RecordError, Verdict, Words, check, merged, prove_supervised,
+    worst,
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -32,6 +33,9 @@ pub struct CertifyArguments {
     /// Print the claims as JSON instead of text
     #[arg(long)]
     json: bool,
+    /// Write what is proved, with all that another program needs to check it (docs/proved.md), to FILE
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
 }
 
 /// What `--json` prints.
@@ -67,7 +71,9 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
                 );
             }
         }
-        let claims = polytopic::claims(&door, &text, arguments.region)?;
+        let mut record = Record::default();
+        let claims = polytopic::claims(&door, &text, arguments.region, &mut record)?;
+        write(arguments, &record)?;
         let name = arguments.design.file_stem().map_or("design".into(), |name| name.to_string_lossy().into_owned());
         return finish(arguments, &name, worst(&claims), &claims);
     }
@@ -83,6 +89,11 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
     let options = ProofOptions { rate: arguments.rate, level: arguments.region, nonlinear: arguments.nonlinear };
     let (claims, verdict) = match prove_supervised(&design, &*plant, &options) {
         Ok(proofs) => {
+            if arguments.record.is_some() {
+                let mut record = Record::default();
+                record.add_design(&design, &*plant, &proofs).map_err(|error| unwritten(arguments, &error))?;
+                write(arguments, &record)?;
+            }
             let claims = merged(checked, proofs.claims.clone());
             // what is looked for beyond the design's own claims counts only if it is decided
             let found: Vec<Claim> =
@@ -101,6 +112,19 @@ pub fn run(arguments: &CertifyArguments) -> Result<(), Failure> {
         }
     };
     finish(arguments, &design.name, verdict, &claims)
+}
+
+/// Write the record where it is asked for; one that would be empty is an error.
+fn write(arguments: &CertifyArguments, record: &Record) -> Result<(), Failure> {
+    let Some(file) = &arguments.record else { return Ok(()) };
+    if record.is_empty() {
+        return Err(Failure::NotCertified("nothing is proved that could be recorded".into()));
+    }
+    std::fs::write(file, record.text()).map_err(|error| Failure::io(file, &error))
+}
+
+fn unwritten(arguments: &CertifyArguments, error: &RecordError) -> Failure {
+    Failure::Unreadable { file: arguments.design.clone(), message: error.to_string() }
 }
 
 /// Print the claims; exit as the verdict asks.

@@ -4,7 +4,7 @@
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::engineers_words;
-use lpv::certificate::{Claim, Member, PolytopicClaim, PolytopicLyapunov, prove_polytopic};
+use lpv::certificate::{Claim, Member, PolytopicClaim, PolytopicLyapunov, Record, RecordError, prove_polytopic};
 use lpv::math::Mat;
 use lpv::math::decimal::about;
 use lpv::math::definite::{Definiteness, asymmetry, definiteness, smallest_eigenvalue_about};
@@ -86,7 +86,7 @@ pub fn is_polytopic(text: &str) -> bool {
 }
 
 /// Prove what the file claims; `region` replaces its γ.
-pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>, Failure> {
+pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record) -> Result<Vec<Claim>, Failure> {
     let file: PolytopicFile = serde_json::from_str(text).map_err(|error| Failure::Unreadable {
         file: door.file.to_owned(),
         message: format!("is not a design over a polytope: {}", engineers_words(&error.to_string())),
@@ -156,13 +156,20 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>
         weights: weights.clone(),
         saturation: saturation.clone(),
     };
+    let mut proved = |claim: PolytopicClaim| {
+        let claims = prove_polytopic(&claim);
+        let unwritten =
+            |error: RecordError| Failure::Unreadable { file: door.file.to_owned(), message: error.to_string() };
+        record.add_polytopic(&claim, &claims).map_err(unwritten)?;
+        Ok(claims)
+    };
     match kind {
         Kind::ParameterDependent => {
             let (y, l) = (needed("Y", sized("Y", &file.y, [n, n])?)?, needed("L", sized("L", &file.l, [m, n])?)?);
             symmetric("Y", &y)?;
             let rate_vertices = rates(door, &file, count)?;
             let lyapunov = PolytopicLyapunov::ParameterDependent { y, l, rate_vertices };
-            Ok(prove_polytopic(&claim(polytope, lyapunov, auxiliary_gain)))
+            proved(claim(polytope, lyapunov, auxiliary_gain))
         }
         Kind::Common => {
             let (p, gain) = (needed("P", p)?, needed("K", sized("K", &file.k, [m, n])?)?);
@@ -171,19 +178,20 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>) -> Result<Vec<Claim>
                 return door.refuse("P", "differs between vertices: give one for all, or lyapunov = \"parameter-dependent\" with Y, L and rate_vertices, or \"frozen\"");
             }
             let lyapunov = PolytopicLyapunov::Common { p: p[0].clone(), gain };
-            Ok(prove_polytopic(&claim(polytope, lyapunov, auxiliary_gain)))
+            proved(claim(polytope, lyapunov, auxiliary_gain))
         }
         Kind::Frozen => {
             let (p, gain) = (needed("P", p)?, needed("K", sized("K", &file.k, [m, n])?)?);
             symmetric("P", &p)?;
-            let at = |i: usize| {
+            let mut at = |i: usize| {
                 let model = Polytope::hull(&[polytope.vertex(i)]);
                 let lyapunov = PolytopicLyapunov::Common { p: p[i].clone(), gain: vec![gain[i].clone()] };
-                let claims =
-                    prove_polytopic(&claim(model, lyapunov, auxiliary_gain.as_ref().map(|f| vec![f[i].clone()])));
-                claims.into_iter().map(move |claim| if count > 1 { claim.of_member(Member::Point(i)) } else { claim })
+                let claims = proved(claim(model, lyapunov, auxiliary_gain.as_ref().map(|f| vec![f[i].clone()])))?;
+                let named = |claim: Claim| if count > 1 { claim.of_member(Member::Point(i)) } else { claim };
+                Ok(claims.into_iter().map(named).collect::<Vec<Claim>>())
             };
-            Ok((0..count).flat_map(at).collect())
+            let each: Vec<Vec<Claim>> = (0..count).map(&mut at).collect::<Result<_, Failure>>()?;
+            Ok(each.into_iter().flatten().collect())
         }
     }
 }

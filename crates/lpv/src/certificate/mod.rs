@@ -15,8 +15,8 @@ mod supervised;
 pub use claim::{Claim, ClaimId, ClaimKind, Member, Motion, Of, Subject, Verdict, Witness, Words, settle, worst};
 pub use inequality::{BlockMargin, block_margins};
 pub use proof::{
-    COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Unprovable,
-    lyapunov_matrix, prove, prove_gain, prove_polytopic,
+    COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Record,
+    RecordError, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic,
 };
 pub use region::{
     Excursion, LyapunovFunction, StepBound, StepConditions, UnmetCondition, excursion, step_bound, unsaturated_level,

@@ -17,6 +17,7 @@ mod matrix;
 mod motion;
 mod nonlinear;
 mod polytopic;
+mod record;
 mod rowwise;
 mod sampled;
 mod weights;
@@ -29,6 +30,7 @@ pub use motion::MotionProof;
 pub(super) use motion::prove_motion;
 pub use nonlinear::NonlinearProof;
 pub use polytopic::{PolytopicClaim, PolytopicLyapunov, prove_polytopic};
+pub use record::{Record, RecordError};
 
 use super::claim::{Claim, ClaimKind, Of, Verdict, Witness, Words, settle};
 use crate::math::decimal::{about, at_least};

@@ -60,7 +60,7 @@ pub(super) struct ClosedLoop<'a> {
     pub sigma: Vec<f64>,
     pub form: Form,
     /// F(ρ) that stays unsaturated; in the inverse form L = FY.
-    auxiliary: Option<MatrixFunction>,
+    pub auxiliary: Option<MatrixFunction>,
     /// ρ = low + t · step.
     low: f64,
     step: Interval,

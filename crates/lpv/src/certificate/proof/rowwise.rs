@@ -58,6 +58,8 @@ pub(super) struct RowWise {
     decrease: Decrease,
     /// Σ δᵢᵀδᵢ/(4αᵢ)
     taken: CellMatrix,
+    /// αᵢ of the inputs that may saturate; empty where there are none to be had.
+    pub alpha: Vec<f64>,
 }
 
 impl Decreasing for RowWise {
@@ -164,20 +166,20 @@ impl ClosedLoop<'_> {
         let (over, over_rows) = at(Taylor::variable(Interval::new(middle - half, middle + half)));
         let (middle, middle_rows) = at(Taylor::variable_of_first_order(Interval::point(middle)));
         let decrease = Decrease::new(&over, &middle);
-        let nothing = || CellMatrix::unbounded(self.weights.q.nrows());
+        let nothing = || (CellMatrix::unbounded(self.weights.q.nrows()), Vec::new());
         let with_f = [(claimed.factor, &decrease.constant), (claimed.cost, &decrease.cost)];
-        let taken = match CellMatrix::combination(&with_f).middle_inverse() {
+        let (taken, alpha) = match CellMatrix::combination(&with_f).middle_inverse() {
             None => nothing(),
             Some(inverse) => {
                 let alpha = middle_rows.balance(&inverse);
                 let taken = |rows: &Rows| rows.slack(&alpha).quadratic(&shares(&alpha));
                 match over_rows.is_left_out(&alpha) {
                     true => nothing(),
-                    false => CellMatrix::new(&taken(&middle_rows), &taken(&over_rows)),
+                    false => (CellMatrix::new(&taken(&middle_rows), &taken(&over_rows)), alpha),
                 }
             }
         };
-        RowWise { decrease, taken }
+        RowWise { decrease, taken, alpha }
     }
 
     #[allow(clippy::too_many_arguments)] // one line of the derivation

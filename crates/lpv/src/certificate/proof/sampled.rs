@@ -22,15 +22,29 @@ use std::time::Instant;
 const TERMS: usize = 20;
 
 /// X, and what has to be definite with it.
-struct SampledCell {
-    x: CellMatrix,
+pub(super) struct SampledCell {
+    pub x: CellMatrix,
     decrease: CellMatrix,
 }
 
 /// The claim that the loop, sampled every `sample_time_s` seconds, is stable at every fixed value of the parameter.
 pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, sample_time_s: f64) -> Claim {
     let started = Instant::now();
-    let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| cell(closed_loop, place, sample_time_s));
+    let (cells, attempt) = prove_cells(closed_loop, sample_time_s);
+    let kind = ClaimKind::SampledStability { sample_time_s };
+    let mut claim = words.claim(kind, attempt.clone(), closed_loop, cells.len(), started);
+    if let Attempt::Open { place } = attempt {
+        claim.detail = format!("no proof was found around parameter {:.6}", closed_loop.parameter(place.middle));
+    }
+    claim
+}
+
+/// The cells with their X, and what they prove.
+pub(super) fn prove_cells<'a>(
+    closed_loop: &'a ClosedLoop<'a>,
+    sample_time_s: f64,
+) -> (Cells<'a, SampledCell>, Attempt) {
+    let mut cells = Cells::new(closed_loop.pieces, 1, move |place: &Place| cell(closed_loop, place, sample_time_s));
     let attempt = cells.prove(LEAST_HALF, &|cell: &SampledCell, half| {
         // that this X does not do says nothing of others
         let open = |definiteness| match definiteness {
@@ -39,12 +53,7 @@ pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, sample_time_s: f64)
         };
         [&cell.x, &cell.decrease].map(|matrix| (0.0, open(matrix.is_positive(half)))).to_vec()
     });
-    let kind = ClaimKind::SampledStability { sample_time_s };
-    let mut claim = words.claim(kind, attempt.clone(), closed_loop, cells.len(), started);
-    if let Attempt::Open { place } = attempt {
-        claim.detail = format!("no proof was found around parameter {:.6}", closed_loop.parameter(place.middle));
-    }
-    claim
+    (cells, attempt)
 }
 
 fn cell(closed_loop: &ClosedLoop, place: &Place, sample_time_s: f64) -> SampledCell {

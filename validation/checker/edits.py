@@ -1,0 +1,373 @@
+#!/usr/bin/env python3
+"""Edits proof records and shows that the checker refuses every one: `edits.py RECORD …`.
+
+Half of the edits change one number and leave the digest as it was. The other half have the digest computed again: a number that
+contradicts another or that the cells do not prove, a cell that is missing, a gap, an exchanged premise, a dropped claim. (An edit
+that leaves a true statement that the record still proves, such as a larger bound of the cost, is no forgery and is not among them.)
+"""
+import hashlib
+import json
+import math
+import os
+import random
+import sys
+import tempfile
+
+import check
+
+EDITS = 200
+
+
+class Unfit(Exception):
+    """The edit is of something that this record does not have."""
+
+
+def parse(path):
+    with open(path, encoding="utf-8") as file:
+        return [json.loads(line) for line in file]
+
+
+def dump(lines, has_new_digest):
+    body = "".join(json.dumps(line, separators=(",", ":"), sort_keys=True) + "\n" for line in lines[1:])
+    head = dict(lines[0])
+    if has_new_digest:
+        head["lines"], head["sha256"] = len(lines) - 1, hashlib.sha256(body.encode()).hexdigest()
+    return json.dumps(head) + "\n" + body
+
+
+def scaled(text, factor):
+    return (float.fromhex(text) * factor).hex()
+
+
+def next_up(text):
+    return math.nextafter(float.fromhex(text), math.inf).hex()
+
+
+def numbers(value):
+    """Every place of a number, as (container, key)."""
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        if isinstance(item, (dict, list)):
+            yield from numbers(item)
+        elif isinstance(item, str) and item.lstrip("-").startswith("0x"):
+            yield value, key
+
+
+def pick(rng, items):
+    items = list(items)
+    if not items:
+        raise Unfit
+    return rng.choice(items)
+
+
+def claims(lines, *kinds):
+    return [line for line in lines if "claim" in line and (not kinds or line["kind"] in kinds)]
+
+
+def designs(lines):
+    return [line for line in lines if "plant" in line]
+
+
+def group(rng, lines, least=1):
+    return pick(rng, (g for c in claims(lines) for g in c.get("groups", []) if len(g["cells"]) >= least))
+
+
+def off_diagonal(rng, rows):
+    i, j = rng.sample(range(len(rows)), 2)
+    rows[i][j] = next_up(rows[i][j])
+
+
+# ---- one edit each, of the lines of a record ----
+
+
+def missing_cell(rng, lines):
+    cells = group(rng, lines, 2)["cells"]
+    del cells[rng.randrange(len(cells))]
+
+
+def missing_cells_of_a_piece(rng, lines):
+    groups = pick(rng, (c["groups"] for c in claims(lines) if len(c.get("groups", [])) > 1))
+    del groups[rng.randrange(len(groups))]
+
+
+def gap(rng, lines):
+    cell = pick(rng, group(rng, lines, 2)["cells"][1:])
+    cell[0] = next_up(cell[0])
+
+
+def early_end(rng, lines):
+    cell = group(rng, lines)["cells"][-1]
+    cell[1] = math.nextafter(float.fromhex(cell[1]), 0).hex()
+
+
+def cells_of_another_piece(rng, lines):
+    groups = pick(rng, (c["groups"] for c in claims(lines) if len(c.get("groups", [])) > 1))
+    first, second = rng.sample(groups, 2)
+    first["cells"], second["cells"] = second["cells"], first["cells"]
+    if first["piece"] == second["piece"]:
+        raise Unfit
+
+
+def another_premise(rng, lines):
+    claim = pick(rng, (c for c in claims(lines) if c["premises"]))
+    k = rng.randrange(len(claim["premises"]))
+    claim["premises"][k] = pick(rng, set(range(claim["claim"])) - {claim["premises"][k]})
+
+
+def premises_exchanged(rng, lines):
+    premises = pick(rng, (c["premises"] for c in claims(lines) if len(c["premises"]) > 1))
+    premises[0], premises[-1] = premises[-1], premises[0]
+
+
+def dropped_premise(rng, lines):
+    del pick(rng, (c["premises"] for c in claims(lines) if c["premises"]))[-1]
+
+
+def dropped_claim(rng, lines):
+    needed = {number for c in claims(lines) for number in c["premises"]}
+    gone = pick(rng, needed)
+    lines[:] = [line for line in lines if line.get("claim") != gone]
+    for claim in claims(lines):
+        claim["claim"] -= claim["claim"] > gone
+        claim["premises"] = [number - (number > gone) for number in claim["premises"] if number != gone]
+
+
+def claim_twice(rng, lines):
+    lines.append({**pick(rng, claims(lines)), "claim": len(claims(lines))})
+
+
+def other_level(rng, lines):
+    claim = pick(rng, (c for c in claims(lines, "unsaturated", "decrease") if c["level"]))
+    claim["level"] = next_up(claim["level"])
+
+
+def larger_set(rng, lines):
+    levels = [c for c in claims(lines, "unsaturated", "decrease", "cost") if c["level"] and c["design"] == 0]
+    for claim in levels or pick(rng, []):
+        claim["level"] = scaled(claim["level"], 1.2)
+
+
+def faster(rng, lines):
+    claim = pick(rng, (c for c in claims(lines, "cost") if "rate" in c))
+    claim["rate"] = scaled(claim["rate"], 100) if float.fromhex(claim["rate"]) else (1.0).hex()
+
+
+def faster_altogether(rng, lines):
+    for claim in [c for c in claims(lines, "decrease", "cost") if float.fromhex(c.get("rate", "0x0p+0"))] or pick(rng, []):
+        claim["rate"] = scaled(claim["rate"], 3)
+
+
+def cheaper(rng, lines):
+    claim = pick(rng, claims(lines, "cost"))
+    claim["factor"] = scaled(claim["factor"], 0.9)
+
+
+def sampled_otherwise(rng, lines):
+    claim = pick(rng, claims(lines, "sampled"))
+    claim["sample_time_s"] = scaled(claim["sample_time_s"], 1.1)
+
+
+def sampled_slowly(rng, lines):
+    claim, design = pick(rng, claims(lines, "sampled")), pick(rng, designs(lines)[:1])
+    claim["sample_time_s"] = design["sample_time_s"] = scaled(claim["sample_time_s"], 1e4)
+
+
+def other_gain(rng, lines):
+    schedule = pick(rng, designs(lines))["controller"]["schedule"]
+    container, key = pick(rng, numbers(schedule.get("gains", schedule.get("gain", []))))
+    container[key] = scaled(container[key], 1.1) if schedule["kind"] == "vertices" else next_up(container[key])
+    if container[key] == (0.0).hex():
+        raise Unfit
+
+
+def other_gain_of_a_point(rng, lines):
+    design = pick(rng, (d for d in designs(lines) if d["controller"]["schedule"]["kind"] != "vertices"))
+    container, key = pick(rng, numbers(pick(rng, design["points"])["gain"]))
+    container[key] = next_up(container[key])
+
+
+def other_knot(rng, lines):
+    point = pick(rng, pick(rng, designs(lines))["points"])
+    point["rho"] = (float.fromhex(point["rho"]) + 1e-9).hex()
+
+
+def weaker_gain_everywhere(rng, lines):
+    design = pick(rng, designs(lines))
+    for container, key in [*numbers(design["controller"]["schedule"].get("gains", [])), *numbers([p["gain"] for p in design["points"]])]:
+        container[key] = scaled(container[key], -1.0)
+    if design["controller"]["schedule"]["kind"] == "constant":
+        design["controller"]["schedule"]["gain"] = design["points"][0]["gain"]
+
+
+def unsymmetric_lyapunov(rng, lines):
+    line = lines[1]
+    if "plant" not in line:
+        return off_diagonal(rng, line["P"] if "P" in line else pick(rng, line["Y"]))
+    function = (line.get("rate_bounded") or {}).get("y") or line.get("joined", {}).get("p")
+    return off_diagonal(rng, pick(rng, function["coefficients"]) if function else line["points"][0]["p"])
+
+
+def other_lyapunov_of_a_point(rng, lines):
+    point = pick(rng, pick(rng, (d for d in designs(lines) if len(d["points"]) > 1))["points"])
+    i = rng.randrange(len(point["p"]))
+    point["p"][i][i] = scaled(point["p"][i][i], 1.01)
+
+
+def other_lyapunov(rng, lines):
+    design = pick(rng, (d for d in designs(lines) if d.get("joined")))
+    rows = pick(rng, design["joined"]["p"]["coefficients"])
+    i = rng.randrange(len(rows))
+    rows[i][i] = (float.fromhex(rows[i][i]) + 1e-3).hex()
+
+
+def indefinite_lyapunov(rng, lines):
+    line = lines[1]
+    if "plant" in line:
+        raise Unfit
+    rows = line["P"] if "P" in line else pick(rng, line["Y"])
+    rows[0][0] = scaled(rows[0][0], -1)
+
+
+def other_weight(rng, lines):
+    weights = pick(rng, (line["weights"] for line in lines[1:] if line.get("weights")))
+    rows = weights[rng.choice("qr")]
+    rows[0][0] = scaled(rows[0][0], -1)
+
+
+def larger_weight(rng, lines):
+    weights = pick(rng, (line["weights"] for line in lines[1:] if line.get("weights")))
+    weights["q"][0][0] = scaled(weights["q"][0][0], 100)
+
+
+def other_plant(rng, lines):
+    plant = pick(rng, (d["plant"] for d in designs(lines) if d["plant"]["name"] == "quadrotor"))
+    plant["mass_kg"] = next_up(plant["mass_kg"])
+
+
+def slimmer_plant(rng, lines):
+    plant = pick(rng, (d["plant"] for d in designs(lines) if d["plant"]["name"] == "quadrotor"))
+    plant["arm_length_m"] = scaled(plant["arm_length_m"], -1)
+
+
+def other_vertex(rng, lines):
+    line = pick(rng, (line for line in lines[1:] if "polytope" in line))
+    line["A"][0][0][0] = (9.0).hex()
+
+
+def other_weight_of_the_input(rng, lines):
+    line = pick(rng, (line for line in lines[1:] if "polytope" in line))
+    line["B"][0][-1 if len(line["B"][0]) < 3 else 2][0] = (-1.0).hex()
+
+
+def less_room(rng, lines):
+    line = pick(rng, (line for line in lines[1:] if line.get("sigma") or line.get("controller", {}).get("limits", {}).get("max", [None])[0]))
+    bounds = line["sigma"] if "sigma" in line else line["controller"]["limits"]["max"]
+    bounds[0] = (0.5 * (float.fromhex(bounds[0]) + (float.fromhex(line["controller"]["operating_input"][0]) if "plant" in line else 0))).hex()
+
+
+def unsymmetric_sampled(rng, lines):
+    off_diagonal(rng, pick(rng, pick(rng, pick(rng, claims(lines, "sampled"))["groups"])["cells"])[2])
+
+
+def indefinite_sampled(rng, lines):
+    x = pick(rng, pick(rng, pick(rng, claims(lines, "sampled"))["groups"])["cells"])[2]
+    i = rng.randrange(len(x))
+    x[i][i] = scaled(x[i][i], -1)
+
+
+def mixtures_missing(rng, lines):
+    groups = pick(rng, (g for c in claims(lines, "decrease", "cost") for g in c.get("groups", []) if isinstance(g["variant"], list)))
+    groups["variant"] = [] if groups["variant"] else [0]
+
+
+def governor_of(rng, lines):
+    supervisors = (d["controller"].get("supervisor") for d in designs(lines))
+    return pick(rng, (s for s in supervisors if s and s.get("governor")))["governor"]
+
+
+def other_motion(rng, lines):
+    functions = governor_of(rng, lines)["motion"][rng.choice(["states", "inputs"])]
+    places = [(c, k) for f in functions for c, k in numbers(f["coefficients"]) if abs(float.fromhex(c[k])) > 1e-3]
+    container, key = pick(rng, places)
+    container[key] = scaled(container[key], 1.001)
+
+
+def other_flow(rng, lines):
+    container, key = pick(rng, numbers(governor_of(rng, lines)["motion"]["parameter_flow"]["coefficients"]))
+    container[key] = (0.5 + float.fromhex(container[key])).hex()
+
+
+def more_authority(rng, lines):
+    budget = governor_of(rng, lines)["motion"]["input_budget"]
+    budget[0] = scaled(budget[0], 1.01)
+
+
+def wider_sets(rng, lines):
+    bound = pick(rng, pick(rng, claims(lines, "motion"))["bounds"])
+    key = rng.choice("qy")
+    bound[key] = scaled(bound[key], 10)
+
+
+def other_inner_gain(rng, lines):
+    supervisors = (d["controller"].get("supervisor") for d in designs(lines))
+    inner = pick(rng, (m for s in supervisors if s for m in s["inner"]))
+    container, key = pick(rng, numbers(inner["schedule"]["gains"]))
+    container[key] = next_up(container[key])
+
+
+FORGERIES = [
+    missing_cell, missing_cells_of_a_piece, gap, early_end, cells_of_another_piece, another_premise, premises_exchanged,
+    dropped_premise, dropped_claim, claim_twice, other_level, larger_set, faster, faster_altogether, cheaper, sampled_otherwise, sampled_slowly,
+    other_gain, other_gain_of_a_point, other_knot, weaker_gain_everywhere, unsymmetric_lyapunov, other_lyapunov_of_a_point,
+    other_lyapunov, indefinite_lyapunov, other_weight, larger_weight, other_plant, slimmer_plant, other_vertex,
+    other_weight_of_the_input, less_room, unsymmetric_sampled, indefinite_sampled, mixtures_missing, other_motion, other_flow,
+    more_authority, wider_sets, other_inner_gain,
+]  # fmt: skip
+
+
+def one_number(rng, lines):
+    container, key = pick(rng, numbers(pick(rng, [line for line in lines[1:] if any(numbers(line))])))
+    container[key] = next_up(container[key])
+
+
+def edited(rng, paths, texts):
+    """Edits as (name, record, text)."""
+    for k in range(EDITS // 2):
+        path = paths[k % len(paths)]
+        lines = json.loads(texts[path])
+        one_number(rng, lines)
+        yield "one number, digest kept", path, dump(lines, False)
+    made = k = 0
+    while made < EDITS - EDITS // 2:
+        forgery, path = FORGERIES[k % len(FORGERIES)], paths[(k + k // len(FORGERIES)) % len(paths)]
+        k += 1
+        lines = json.loads(texts[path])
+        try:
+            forgery(rng, lines)
+        except Unfit:
+            continue
+        made += 1
+        yield forgery.__name__.replace("_", " "), path, dump(lines, True)
+
+
+def main():
+    rng, paths = random.Random(1), sys.argv[1:]
+    texts = {path: json.dumps(parse(path)) for path in paths}
+    refused = 0
+    with tempfile.TemporaryDirectory() as folder:
+        file = os.path.join(folder, "edited.jsonl")
+        for name, path, text in edited(rng, paths, texts):
+            with open(file, "w", encoding="utf-8") as out:
+                out.write(text)
+            try:
+                check.check(file)
+                print(f"ACCEPTED: {os.path.basename(path)}: {name}")
+            except Exception as error:
+                refused += 1
+                if "-v" in os.environ.get("EDITS", ""):
+                    print(f"{os.path.basename(path)}: {name}: {error}")
+    print(f"{refused} of {EDITS} refused")
+    return 0 if refused == EDITS else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
