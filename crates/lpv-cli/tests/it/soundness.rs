@@ -69,7 +69,8 @@ fn nothing_rests_on_a_false_premise() {
     let (code, claims, certificate) = certified("design-slqr-1.json", "--region 1000");
     assert_eq!((code, verdict(&claims, "unsaturated")), (4, "refuted"));
     assert_eq!((verdict(&claims, "invariance"), verdict(&claims, "cost")), ("undecided", "undecided"));
-    let invariance = certificate["claims"].as_array().unwrap().iter().find(|claim| claim["id"] == "invariance").unwrap();
+    let invariance =
+        certificate["claims"].as_array().unwrap().iter().find(|claim| claim["id"] == "invariance").unwrap();
     assert_eq!(invariance["premises"], serde_json::json!(["lyapunov-definite", "unsaturated"]));
     assert!(invariance["detail"].as_str().unwrap().contains("does not saturate on x'P x <= 1000"), "{invariance}");
 }

@@ -18,6 +18,8 @@ mod motion;
 mod nonlinear;
 mod polytopic;
 mod sampled;
+mod sampled_saturated;
+mod sampled_spectrum;
 mod weights;
 mod witness;
 
@@ -340,6 +342,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         claims.push(Claim::new(ClaimKind::AsAsked { what: "rate", asked: rate, proved }, Of::Model, &words));
     }
     claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
+    claims.extend(level.map(|level| sampled_saturated::prove(&closed_loop, &words, level, design.sample_time_s)));
     let mut nonlinear = None;
     if options.nonlinear {
         let (found, proof) = nonlinear::prove(&closed_loop, &words, level);
