@@ -20,6 +20,9 @@ mod polytopic;
 mod record;
 mod rowwise;
 mod sampled;
+mod sampled_constant;
+mod sampled_saturated;
+mod sampled_spectrum;
 mod weights;
 mod witness;
 
@@ -344,6 +347,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         claims.push(Claim::new(ClaimKind::AsAsked { what: "rate", asked: rate, proved }, Of::Model, &words));
     }
     claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
+    claims.extend(level.map(|level| sampled_saturated::prove(&closed_loop, &words, level, design.sample_time_s)));
     let mut nonlinear = None;
     if options.nonlinear {
         let (found, proof) = nonlinear::prove(&closed_loop, &words, level);

@@ -1,6 +1,7 @@
 //! Eigenvalues: of symmetric matrices, of pencils of definite ones, and of general real matrices.
 
 use super::Mat;
+use faer::linalg::solvers::DenseSolveCore;
 use faer::{Side, c64};
 
 /// The eigenvalues of a symmetric matrix in ascending order (the lower triangle is read).
@@ -53,6 +54,39 @@ pub fn spectral_abscissa(matrix: &Mat<f64>) -> f64 {
 /// max |λ(M)|: below one exactly when x₊ = Mx is asymptotically stable.
 pub fn spectral_radius(matrix: &Mat<f64>) -> f64 {
     eigenvalues(matrix).into_iter().map(|(re, im)| re.hypot(im)).fold(0.0, nan_max)
+}
+
+/// Eigenvalues (re, im) of a real square matrix with eigenvectors as columns of real and imaginary parts, and the inverse V⁻¹ of these in
+/// the same form; `None` where numbers do not tell them.
+pub fn eigenvectors(matrix: &Mat<f64>) -> Option<Eigenvectors> {
+    let n = matrix.nrows();
+    let eigen = matrix.eigen().ok()?;
+    let v = Mat::<c64>::from_fn(n, n, |i, j| eigen.U()[(i, j)]);
+    let inverse = v.partial_piv_lu().inverse();
+    let parts = |m: &Mat<c64>| [Mat::from_fn(n, n, |i, j| m[(i, j)].re), Mat::from_fn(n, n, |i, j| m[(i, j)].im)];
+    let values = (0..n).map(|i| (eigen.S()[i].re, eigen.S()[i].im)).collect();
+    Some(Eigenvectors { values, vectors: parts(&v), inverse: parts(&inverse) })
+}
+
+/// Of a real matrix, see [`eigenvectors`].
+pub struct Eigenvectors {
+    /// (re, im)
+    pub values: Vec<(f64, f64)>,
+    /// Re V, Im V
+    pub vectors: [Mat<f64>; 2],
+    /// Re V⁻¹, Im V⁻¹
+    pub inverse: [Mat<f64>; 2],
+}
+
+/// The real part (or the imaginary, if larger) of an eigenvector of the eigenvalue of largest modulus.
+pub fn growing_direction(matrix: &Mat<f64>) -> Option<Vec<f64>> {
+    let Eigenvectors { values, vectors, .. } = eigenvectors(matrix)?;
+    let modulus = |k: &usize| values[*k].0.hypot(values[*k].1);
+    let largest = (0..values.len()).max_by(|a, b| modulus(a).total_cmp(&modulus(b)))?;
+    let parts = vectors.map(|part| (0..values.len()).map(|i| part[(i, largest)]).collect::<Vec<f64>>());
+    let size = |part: &[f64]| part.iter().map(|x| x * x).sum::<f64>();
+    let direction = if size(&parts[0]) >= size(&parts[1]) { &parts[0] } else { &parts[1] };
+    (size(direction) > 0.0 && size(direction).is_finite()).then(|| direction.clone())
 }
 
 /// The larger of two numbers, NaN if either is: an eigenvalue that could not be computed must not pass for stable.

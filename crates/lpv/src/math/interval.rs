@@ -64,6 +64,12 @@ impl Interval {
         self.lo == 0.0 && self.hi == 0.0
     }
 
+    /// Whether it is exactly one.
+    #[inline]
+    fn is_one(self) -> bool {
+        self.lo == 1.0 && self.hi == 1.0
+    }
+
     /// The largest absolute value of a member.
     pub fn magnitude(self) -> f64 {
         self.lo.abs().max(self.hi.abs())
@@ -203,6 +209,13 @@ impl Mul for Interval {
             let finite = self.magnitude().is_finite() && other.magnitude().is_finite();
             return if finite { Self::point(0.0) } else { Self::ENTIRE };
         }
+        // so that the Jacobian of a linear plant holds the numbers of its file and no others
+        if self.is_one() {
+            return other;
+        }
+        if other.is_one() {
+            return self;
+        }
         let [a, b, c, d] = [self.lo * other.lo, self.lo * other.hi, self.hi * other.lo, self.hi * other.hi];
         // NaN of 0 · ∞ is lost in min and max, but the other products are then infinite or NaN
         let least = if a < b { a } else { b };
@@ -250,6 +263,9 @@ impl Mul<f64> for Interval {
     fn mul(self, factor: f64) -> Self {
         if self.is_zero() || factor == 0.0 || factor.is_nan() {
             return self * Interval::from(factor);
+        }
+        if self.is_one() && factor.is_finite() {
+            return Self::point(factor);
         }
         let [a, b] = [self.lo * factor, self.hi * factor];
         if factor > 0.0 { Self::outward(a, b) } else { Self::outward(b, a) }

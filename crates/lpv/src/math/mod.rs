@@ -1,10 +1,12 @@
-//! Mathematics that the rest of the library stands on: scalars for several arithmetics (dual numbers, intervals, Taylor forms), small matrix helpers,
-//! Riccati and Lyapunov equations, eigenvalues, angles, tensors and their higher-order singular value decomposition.
+//! Mathematics that the rest of the library stands on: scalars for several arithmetics (dual numbers, intervals, Taylor forms, balls of any precision), small matrix helpers,
+//! Riccati, Lyapunov and Stein equations, eigenvalues, angles, tensors and their higher-order singular value decomposition.
 //!
 //! Dense linear algebra is [`faer`]'s, and it is named only here (and in crate `lmi`). Nothing here knows of plants
 //! or controllers.
 
 pub mod angle;
+pub mod balance;
+pub mod ball;
 pub mod decimal;
 pub mod definite;
 pub mod eigen;
@@ -15,6 +17,8 @@ pub mod lyapunov;
 pub mod matrix;
 pub mod riccati;
 pub mod scalar;
+pub mod schur_cohn;
+pub mod stein;
 pub mod taylor;
 pub mod tensor;
 

@@ -13,6 +13,8 @@ use crate::model::MatrixFunction;
 use crate::plant::{Description, Plant};
 use crate::synthesis::{CostWeights, Design};
 
+/// The mixture of rows of K alone, however many inputs there are.
+pub(super) const ALL_HIGH: usize = usize::MAX;
 /// Pieces that the circle is cut into where the gain is one formula everywhere.
 const PIECES: usize = 16;
 /// Harmonics of P smaller than this, against its largest entry, are rounding errors.
@@ -256,10 +258,11 @@ impl<'a> ClosedLoop<'a> {
         let (n, m) = (self.weights.q.nrows(), self.inputs());
         let (a, b, k) = self.model_and_gain(piece, t);
         let CostWeights { q, .. } = self.weights;
-        // an input that is not limited is always the one of K
+        // an input that is not limited is always the one of K; the bits of many inputs are all low or all high
+        let is_low = |bit: usize| mixture != ALL_HIGH && mixture.checked_shr(bit as u32).unwrap_or(0) & 1 == 0;
         let saturating = self.saturating();
         let is_saturated =
-            |i: usize| saturating.iter().position(|&other| other == i).is_some_and(|bit| mixture >> bit & 1 == 0);
+            |i: usize| saturating.iter().position(|&other| other == i).is_some_and(|bit| is_low(bit));
         let mixed = |k: TaylorMatrix, f: Option<TaylorMatrix>| match f {
             None => k,
             Some(f) => TaylorMatrix::from_fn(m, n, |i, j| if is_saturated(i) { f.at(i, j) } else { k.at(i, j) }),

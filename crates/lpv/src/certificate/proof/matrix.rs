@@ -103,6 +103,11 @@ impl TaylorMatrix {
         Self::from_fn(self.columns, self.rows, |i, j| self.at(j, i))
     }
 
+    /// xM for a number x.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self::from_fn(self.rows, self.columns, |i, j| self.at(i, j) * factor)
+    }
+
     pub fn negated(&self) -> Self {
         Self::from_fn(self.rows, self.columns, |i, j| -self.at(i, j))
     }

@@ -2,50 +2,52 @@
 //!
 //! With Φ = Σ_{k≥0} (AT)ᵏ/(k + 1)!, x₊ = e^{AT}x − ∫₀ᵀ e^{As}ds BKx = (I + TE)x for E = Φ(A − BK), because e^{AT} = I + TΦA. For
 //! any X ≻ 0, X − (I + TE)ᵀX(I + TE) = −T(EᵀX + XE + TEᵀXE): where −(EᵀX + XE + TEᵀXE) ≻ 0, every eigenvalue of I + TE is
-//! inside the unit circle. X is found by numbers in the middle of a cell and serves all of the cell; the series is cut off
-//! with a bound on what is left out, and on its derivatives.
+//! inside the unit circle.
+//!
+//! X is found by numbers, in coordinates balanced by powers of two, as the solution of X − MᵀXM = TI in the middle of a cell, M = I + TE.
+//! Over the cell it is X + (t − c)X′ with the derivative X′ of that solution, so that what is to be positive stays TI to second
+//! order, however close to the circle the eigenvalues are. Where this does not do, `sampled_spectrum` decides at single parameters.
 
 use super::closed_loop::{ClosedLoop, Place};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::sampled_spectrum::{Decision, decide};
+use super::witness::middle as middle_of;
 use super::{Attempt, Cells, LEAST_HALF};
-use crate::certificate::claim::{Claim, ClaimKind, Words};
+use crate::certificate::claim::{Claim, ClaimKind, Verdict, Words};
 use crate::math::Mat;
+use crate::math::balance::balance;
+use crate::math::decimal::at_least;
+use crate::math::eigen::spectral_radius;
 use crate::math::hold::discretize;
 use crate::math::interval::Interval;
-use crate::math::lyapunov;
-use crate::math::matrix::{identity, inverse};
+use crate::math::matrix::{identity, symmetric_part};
+use crate::math::stein;
 use crate::math::taylor::Taylor;
 use crate::model::linearize;
 use std::time::Instant;
 
 /// Terms of the series after which the rest is bounded; it is if ‖AT‖ is at most half of this.
 const TERMS: usize = 20;
+/// log₂‖AT‖ beyond which nothing is computed.
+const MOST_SQUARINGS: f64 = 40.0;
 
 /// X, and what has to be definite with it.
-pub(super) struct SampledCell {
-    pub x: CellMatrix,
+struct SampledCell {
+    x: CellMatrix,
     decrease: CellMatrix,
+    /// Numbers say that the loop is not stable in the middle.
+    looks_unstable: bool,
 }
 
 /// The claim that the loop, sampled every `sample_time_s` seconds, is stable at every fixed value of the parameter.
 pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, sample_time_s: f64) -> Claim {
     let started = Instant::now();
-    let (cells, attempt) = prove_cells(closed_loop, sample_time_s);
     let kind = ClaimKind::SampledStability { sample_time_s };
-    let mut claim = words.claim(kind, attempt.clone(), closed_loop, cells.len(), started);
-    if let Attempt::Open { place } = attempt {
-        claim.detail = format!("no proof was found around parameter {:.6}", closed_loop.parameter(place.middle));
-    }
-    claim
-}
-
-/// The cells with their X, and what they prove.
-pub(super) fn prove_cells<'a>(
-    closed_loop: &'a ClosedLoop<'a>,
-    sample_time_s: f64,
-) -> (Cells<'a, SampledCell>, Attempt) {
-    let mut cells = Cells::new(closed_loop.pieces, 1, move |place: &Place| cell(closed_loop, place, sample_time_s));
+    let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| cell(closed_loop, place, sample_time_s));
     let attempt = cells.prove(LEAST_HALF, &|cell: &SampledCell, half| {
+        if cell.looks_unstable {
+            return vec![(0.0, Definiteness::Refuted { direction: Vec::new(), value: f64::NAN })];
+        }
         // that this X does not do says nothing of others
         let open = |definiteness| match definiteness {
             Definiteness::Refuted { .. } => Definiteness::Open { fits: 0.0 },
@@ -53,77 +55,174 @@ pub(super) fn prove_cells<'a>(
         };
         [&cell.x, &cell.decrease].map(|matrix| (0.0, open(matrix.is_positive(half)))).to_vec()
     });
-    (cells, attempt)
+    let decision = match &attempt {
+        Attempt::Proved(_) => None,
+        Attempt::Refuted { place, .. } | Attempt::Open { place } => Some(decide(closed_loop, place, sample_time_s)),
+    };
+    let claim = words.claim(kind, attempt, closed_loop, cells.len(), started);
+    let claim = match decision {
+        None => claim,
+        Some(Decision::Stable { margin, bits }) => {
+            let detail = format!(
+                "every reflection coefficient of the characteristic polynomial is below 1 by {}, with {bits} bits",
+                at_least(margin)
+            );
+            claim.decided(Verdict::Proved, margin, detail)
+        }
+        Some(Decision::Unstable { witness, reason }) => {
+            let mut claim = claim.refuted_by(Some(witness));
+            claim.detail = format!("{} ({reason})", claim.detail);
+            claim
+        }
+        Some(Decision::Open { reason }) => {
+            let place = claim.at.map_or(String::new(), |at| format!(" around parameter {at:.6}"));
+            claim.decided(Verdict::Undecided, f64::NAN, format!("no proof was found{place}: {reason}"))
+        }
+    };
+    Claim { seconds: started.elapsed().as_secs_f64(), ..claim }
 }
 
 fn cell(closed_loop: &ClosedLoop, place: &Place, sample_time_s: f64) -> SampledCell {
     let Place { piece, middle, half, .. } = *place;
     let n = closed_loop.weights.q.nrows();
-    let Some(x) = lyapunov_matrix(closed_loop, middle, sample_time_s) else {
-        return SampledCell { x: CellMatrix::unbounded(n), decrease: CellMatrix::unbounded(n) };
-    };
-    let x = TaylorMatrix::constant(&x);
-    let over = Taylor::variable(Interval::new(middle - half, middle + half));
+    let scaling = scaling(closed_loop, middle, sample_time_s);
     let at_middle = Taylor::variable_of_first_order(Interval::point(middle));
-    let [middle, over] = [at_middle, over].map(|t| {
-        let e = increment(closed_loop, piece, t, sample_time_s);
-        let xe = x.times(&e);
-        let second = e.transpose().times(&xe);
-        let second = TaylorMatrix::from_fn(n, n, |i, j| second.at(i, j) * sample_time_s);
-        xe.plus(&xe.transpose()).plus(&second).negated()
-    });
-    SampledCell { x: CellMatrix::new(&x, &x), decrease: CellMatrix::new(&middle, &over) }
+    let e = increment(closed_loop, piece, at_middle, sample_time_s, &scaling);
+    let Some([x, x_slope]) = lyapunov_matrices(&e, sample_time_s) else {
+        let looks_unstable = spectral_radius(&(identity(n) + sample_time_s * middle_of(&e))) > 1.0;
+        let nothing = CellMatrix::unbounded(n);
+        return SampledCell { x: nothing.clone(), decrease: nothing, looks_unstable };
+    };
+    let around = Interval::new(-half, half);
+    let over = Taylor::variable(Interval::new(middle - half, middle + half));
+    let e_over = increment(closed_loop, piece, over, sample_time_s, &scaling);
+    let x_of = |distance: Interval| {
+        TaylorMatrix::from_fn(n, n, |i, j| Taylor {
+            value: distance * x_slope[(i, j)] + x[(i, j)],
+            slope: Interval::point(x_slope[(i, j)]),
+            bend: Some(Interval::point(0.0)),
+        })
+    };
+    let (x, x_over) = (x_of(Interval::point(0.0)), x_of(around));
+    let decrease = CellMatrix::new(&decrease(&x, &e, sample_time_s), &decrease(&x_over, &e_over, sample_time_s));
+    SampledCell { x: CellMatrix::new(&x, &x_over), decrease, looks_unstable: false }
 }
 
-/// X of the sampled loop in the middle of a cell, as numbers: FᵀX + XF + Q = 0 for the Cayley transform F of x₊ = A_c x.
-fn lyapunov_matrix(closed_loop: &ClosedLoop, t: f64, sample_time_s: f64) -> Option<Mat<f64>> {
+/// −(EᵀX + XE + TEᵀXE).
+pub(super) fn decrease(x: &TaylorMatrix, e: &TaylorMatrix, sample_time_s: f64) -> TaylorMatrix {
+    let xe = x.times(e);
+    let second = e.transpose().times(&xe).scaled(sample_time_s);
+    xe.plus(&xe.transpose()).plus(&second).negated()
+}
+
+/// X and X′, as numbers that are exactly symmetric, with X − MᵀXM = TI in the middle of a cell and no derivative of the left-hand side:
+/// X′ − MᵀX′M = M′ᵀXM + MᵀXM′. `None` where M = I + TE is not stable.
+fn lyapunov_matrices(e: &TaylorMatrix, sample_time_s: f64) -> Option<[Mat<f64>; 2]> {
+    let n = e.shape().0;
+    let increment = sample_time_s * middle_of(e);
+    let x = stein::solve(&increment, &(sample_time_s * identity(n)))?;
+    let slope = Mat::from_fn(n, n, |i, j| sample_time_s * e.at(i, j).slope.middle());
+    let sampled = identity(n) + &increment;
+    let half = slope.transpose() * &x * &sampled;
+    let x_slope = stein::solve(&increment, &(2.0 * symmetric_part(&half))).unwrap_or_else(|| Mat::zeros(n, n));
+    Some([x, x_slope])
+}
+
+/// Exponents of a diagonal similarity that balances the sampled loop, from numbers.
+pub(super) fn scaling(closed_loop: &ClosedLoop, t: f64, sample_time_s: f64) -> Vec<i32> {
     let model = linearize(closed_loop.plant, closed_loop.parameter(t));
-    let k = closed_loop.gain(t);
     let (a, b) = discretize(&model.a, &model.b, sample_time_s);
-    let sampled = a - b * k;
-    let one = identity(sampled.nrows());
-    let cayley = (2.0 / sample_time_s) * ((&sampled - &one) * inverse(&(&sampled + &one)));
-    let x = lyapunov::solve(&cayley, &closed_loop.weights.q)?;
-    // one that is exactly symmetric
-    Some(Mat::from_fn(x.nrows(), x.ncols(), |i, j| if i <= j { x[(i, j)] } else { x[(j, i)] }))
+    let n = a.nrows();
+    let sampled = a - b * closed_loop.gain(t);
+    // with A itself, whose powers are to be small
+    balance(&Mat::from_fn(n, n, |i, j| sampled[(i, j)].abs() / sample_time_s + model.a[(i, j)].abs()))
 }
 
-/// E = Φ(A − BK) as a function of `t`.
-fn increment(closed_loop: &ClosedLoop, piece: usize, t: Taylor, sample_time_s: f64) -> TaylorMatrix {
+/// E = Φ(A − BK) as a function of `t`, in coordinates x = 2^e x̃.
+pub(super) fn increment(
+    closed_loop: &ClosedLoop,
+    piece: usize,
+    t: Taylor,
+    sample_time_s: f64,
+    exponents: &[i32],
+) -> TaylorMatrix {
     let (a, b, gain) = closed_loop.model_and_gain(piece, t);
-    let n = closed_loop.weights.q.nrows();
-    let at = TaylorMatrix::from_fn(n, n, |i, j| a.at(i, j) * sample_time_s);
+    let [a, b, gain] = balanced([&a, &b, &gain], exponents);
+    hold(&a, sample_time_s).times(&a.minus(&b.times(&gain)))
+}
+
+/// D⁻¹AD, D⁻¹B and KD.
+fn balanced([a, b, gain]: [&TaylorMatrix; 3], exponents: &[i32]) -> [TaylorMatrix; 3] {
+    let power = |e: i32| 2.0_f64.powi(e);
+    let scaled = |matrix: &TaylorMatrix, row: bool, column: bool| {
+        let (rows, columns) = matrix.shape();
+        TaylorMatrix::from_fn(rows, columns, |i, j| {
+            let exponent = if column { exponents[j] } else { 0 } - if row { exponents[i] } else { 0 };
+            if exponent == 0 { matrix.at(i, j) } else { matrix.at(i, j) * power(exponent) }
+        })
+    };
+    [scaled(a, true, true), scaled(b, true, false), scaled(gain, false, true)]
+}
+
+/// Φ = Σ_{k≥0} (AT)ᵏ/(k + 1)!, by its series for h = 2⁻ˢT with ‖Ah‖ ≤ 1, and Φ₂ₕ = Φₕ + ½GₕΦₕ, G₂ₕ = 2Gₕ + Gₕ² for
+/// Gₕ = e^{Ah} − I = AhΦₕ.
+pub(super) fn hold(a: &TaylorMatrix, sample_time_s: f64) -> TaylorMatrix {
+    let n = a.shape().0;
+    let at = a.scaled(sample_time_s);
+    let squarings = norm(&at, |entry| entry.value).hi().log2().ceil().max(0.0);
+    if squarings.is_nan() || squarings > MOST_SQUARINGS {
+        return TaylorMatrix::from_fn(n, n, |_, _| unknown(at.at(0, 0).bend.is_some()));
+    }
+    let short = if squarings == 0.0 { at } else { at.scaled(2.0_f64.powi(-(squarings as i32))) };
+    let mut phi = series(&short);
+    let mut growth = short.times(&phi);
+    for _ in 0..squarings as usize {
+        phi = phi.plus(&growth.times(&phi).scaled(0.5));
+        growth = growth.scaled(2.0).plus(&growth.times(&growth));
+    }
+    phi
+}
+
+/// Σ_{k≥0} Xᵏ/(k + 1)!
+fn series(x: &TaylorMatrix) -> TaylorMatrix {
+    let n = x.shape().0;
     let mut power = TaylorMatrix::constant(&identity(n));
     let mut series = power.clone();
     for k in 1..=TERMS {
-        power = power.times(&at);
+        power = power.times(x);
         power = TaylorMatrix::from_fn(n, n, |i, j| power.at(i, j) / (k + 1) as f64);
         // of a nilpotent A the series ends
         if (0..n * n).all(|entry| power.at(entry / n, entry % n).is_zero()) {
-            return series.times(&a.minus(&b.times(&gain)));
+            return series;
         }
         series = series.plus(&power);
     }
-    let rest = rest(&at, n);
-    series = TaylorMatrix::from_fn(n, n, |i, j| series.at(i, j) + rest);
-    series.times(&a.minus(&b.times(&gain)))
+    let rest = rest(x, TERMS);
+    TaylorMatrix::from_fn(n, n, |i, j| series.at(i, j) + rest)
 }
 
-/// A bound on every entry of Σ_{k>N} (AT)ᵏ/(k + 1)!, N = [`TERMS`], and on its first two derivatives. With μ, μ′, μ″ the row-sum
-/// norms of AT and of its derivatives, and sums that fall at least by halves for μ ≤ N/2, they are at most
+/// A bound on the row sums of one part of the entries.
+fn norm(matrix: &TaylorMatrix, of: impl Fn(Taylor) -> Interval) -> Interval {
+    let (rows, columns) = matrix.shape();
+    let row = |i: usize| (0..columns).fold(Interval::point(0.0), |sum, j| sum + of(matrix.at(i, j)).magnitude());
+    Interval::point((0..rows).map(|i| row(i).hi()).fold(0.0, f64::max))
+}
+
+/// Of which nothing is known.
+fn unknown(has_bend: bool) -> Taylor {
+    Taylor { value: Interval::ENTIRE, slope: Interval::ENTIRE, bend: has_bend.then_some(Interval::ENTIRE) }
+}
+
+/// A bound on every entry of Σ_{k>N} Xᵏ/(k + 1)! after N = `terms` terms, and on its first two derivatives. With μ, μ′, μ″ the row-sum
+/// norms of X and of its derivatives, and sums that fall at least by halves for μ ≤ N/2, they are at most
 /// 2μᴺ⁺¹/(N + 2)!, 2μ′μᴺ/(N + 1)! and 2μ′²μᴺ⁻¹/N! + 2μ″μᴺ/(N + 1)!.
-fn rest(at: &TaylorMatrix, n: usize) -> Taylor {
-    let norm = |of: &dyn Fn(Taylor) -> Interval| {
-        let row = |i: usize| (0..n).fold(Interval::point(0.0), |sum, j| sum + of(at.at(i, j)).magnitude());
-        Interval::point((0..n).map(|i| row(i).hi()).fold(0.0, f64::max))
-    };
-    let has_bend = at.at(0, 0).bend.is_some();
-    let value = norm(&|entry| entry.value);
-    let slope = norm(&|entry| entry.slope);
-    let bend = norm(&|entry| entry.bend.unwrap_or(Interval::point(0.0)));
-    if !(value.hi() <= 0.5 * TERMS as f64 && slope.hi().is_finite() && bend.hi().is_finite()) {
-        let bend = has_bend.then_some(Interval::ENTIRE);
-        return Taylor { value: Interval::ENTIRE, slope: Interval::ENTIRE, bend };
+pub(super) fn rest(x: &TaylorMatrix, terms: usize) -> Taylor {
+    let has_bend = x.at(0, 0).bend.is_some();
+    let value = norm(x, |entry| entry.value);
+    let slope = norm(x, |entry| entry.slope);
+    let bend = norm(x, |entry| entry.bend.unwrap_or(Interval::point(0.0)));
+    if !(value.hi() <= 0.5 * terms as f64 && slope.hi().is_finite() && bend.hi().is_finite()) {
+        return unknown(has_bend);
     }
     // 2 μᵏ/(k + ...)!
     let ratio = |power: usize, factorial: usize| {
@@ -132,8 +231,8 @@ fn rest(at: &TaylorMatrix, n: usize) -> Taylor {
     };
     let around = |bound: Interval| Interval::new(-bound.hi(), bound.hi());
     Taylor {
-        value: around(ratio(TERMS + 1, TERMS + 2)),
-        slope: around(slope * ratio(TERMS, TERMS + 1)),
-        bend: has_bend.then(|| around(slope.square() * ratio(TERMS - 1, TERMS) + bend * ratio(TERMS, TERMS + 1))),
+        value: around(ratio(terms + 1, terms + 2)),
+        slope: around(slope * ratio(terms, terms + 1)),
+        bend: has_bend.then(|| around(slope.square() * ratio(terms - 1, terms) + bend * ratio(terms, terms + 1))),
     }
 }
