@@ -153,7 +153,8 @@ def faster(rng, lines):
 
 
 def faster_altogether(rng, lines):
-    for claim in [c for c in claims(lines, "decrease", "cost") if float.fromhex(c.get("rate", "0x0p+0"))] or pick(rng, []):
+    moving = [c for c in claims(lines, "decrease", "cost") if float.fromhex(c.get("rate", "0x0p+0"))]
+    for claim in moving or pick(rng, []):
         claim["rate"] = scaled(claim["rate"], 3)
 
 
