@@ -1,18 +1,21 @@
 #!/usr/bin/env python3
 """Checks a proof record of lpv without lpv: `check.py RECORD [--design DESIGN.json] [--jobs N]`.
 
-Everything is derived again from the numbers of the record: the plant's linearisation, the closed loop, the matrices that have to be
-definite. Real numbers are balls of Arb (python-flint), whose radii hold every rounding. The method is not that of lpv:
+Everything is derived again from the numbers of the record: the plant's linearisation, the closed loop, the matrices
+that have to be definite. Real numbers are balls of Arb (python-flint), whose radii hold every rounding. The method is
+not that of lpv:
 
-* Every matrix of a theorem is, on a piece of the parameter's range, a sum of constant matrices times t^j cos kρ and t^j sin kρ
-  (`Sum`), ρ = low + ω (piece + t): gains are cubic splines in t, plant and Lyapunov matrix trigonometric polynomials in ρ. Such sums
-  are added, multiplied and differentiated as they are.
-* On a cell [a, b], entry by entry, M(t) = chord of M(a), M(b) + e with e in [-(b - a)²/8, 0]·M''(cell) (error of interpolation). If
-  M(a) + e and M(b) + e are positive definite for all such e, so is every M(t), a convex combination of the two.
-* A symmetric ball matrix N is positive definite if in TNTᵀ - I every row sums to less than 1 (Gershgorin); T is any matrix, here the
-  inverse of a Cholesky factor in floating point.
+* Every matrix of a theorem is, on a piece of the parameter's range, a sum of constant matrices times t^j cos kρ and
+  t^j sin kρ (`Sum`), ρ = low + ω (piece + t): gains are cubic splines in t, plant and Lyapunov matrix trigonometric
+  polynomials in ρ. Such sums are added, multiplied and differentiated as they are.
+* On a cell [a, b], entry by entry, M(t) = chord of M(a), M(b) + e with e in [-(b - a)²/8, 0]·M''(cell) (error of
+  interpolation). If M(a) + e and M(b) + e are positive definite for all such e, so is every M(t), a convex
+  combination of the two.
+* A symmetric ball matrix N is positive definite if in TNTᵀ - I every row sums to less than 1 (Gershgorin); T is any
+  matrix, here the inverse of a Cholesky factor in floating point.
 
-A cell that is too wide for that is halved; one that is missing is refused. The last line says `accepted` only if every claim holds.
+A cell that is too wide for that is halved; one that is missing is refused. The last line says `accepted` only if
+every claim holds.
 """
 import argparse
 import hashlib
@@ -44,7 +47,7 @@ def require(condition, why):
     if not condition:
         raise Refused(why)
 
-# ---------------------------------------------------------------------------------------------------------------- the file
+# ----------------------------------------------------------------------------------------------------------- the file
 
 def load(text):
     """A line of JSON, in which no key stands twice and numbers are integers or hexadecimal floating point."""
@@ -92,7 +95,7 @@ def symmetric(rows, size, what):
 
 
 def semidefinite(rows, strictly):
-    """M ⪰ 0 (or ≻ 0), in rational numbers: no pivot of a symmetric elimination is negative, and beside a zero one stand zeros."""
+    """M ⪰ 0 (or ≻ 0), in rational numbers: no pivot of an elimination is negative, beside a zero one stand zeros."""
     m = [[Fraction(x) for x in row] for row in rows]
     for k in range(len(m)):
         if m[k][k] < 0 or (m[k][k] == 0 and (strictly or any(m[k][k + 1 :]))):
@@ -108,7 +111,7 @@ def check_weights(weights, n, m):
     require(semidefinite(weights["q"], False) and semidefinite(weights["r"], True), "Q is not ⪰ 0, or R not ≻ 0")
     return weights["q"], weights["r"]
 
-# ------------------------------------------------------------------------------------------ matrices as functions on a piece
+# ----------------------------------------------------------------------------------- matrices as functions on a piece
 
 def ball(fraction):
     return arb(fraction.numerator) / arb(fraction.denominator)
@@ -119,7 +122,7 @@ def unit(n, factor=1.0):
 
 
 class Sum:
-    """Σ C t^j cos kρ (s = 0) or t^j sin kρ (s = 1): terms[j, k, s] = C, all of one shape; what is exactly zero is left out."""
+    """Σ C t^j cos kρ (s = 0) or t^j sin kρ (s = 1): terms[j, k, s] = C, of one shape; exact zeros are left out."""
 
     def __init__(self, shape, terms):
         self.shape, self.terms = shape, {}
@@ -209,7 +212,7 @@ def blocks(grid):
         terms[key] = arb_mat([sum(rows, []) for band in bands for rows in zip(*band)])
     return Sum((sum(down), sum(across)), terms)
 
-# ------------------------------------------------------------------------------------------------------- positive definite
+# -------------------------------------------------------------------------------------------------- positive definite
 
 def inverse_factor(m, n):
     """L⁻¹ of M ≈ LLᵀ in floating point, as rows; None if there is none."""
@@ -242,8 +245,8 @@ def is_definite(entries, n):
 
 
 class Family:
-    """A symmetric matrix on a piece that starts at ρ = start. `assemble` makes it of the entries of `sums` and of what a cell carries;
-    it is affine in the entries, and `constant` is 0 for an error of theirs."""
+    """A symmetric matrix on a piece that starts at ρ = start. `assemble` makes it of the entries of `sums` and of what
+    a cell carries; it is affine in the entries, and `constant` is 0 for an error of theirs."""
 
     def __init__(self, place, sums, assemble=lambda entries, extra, constant: entries):
         self.place, self.assemble = place, assemble
@@ -288,7 +291,7 @@ class Family:
                 return False
         return True
 
-# ------------------------------------------------------------------------------------------------------------- the designs
+# -------------------------------------------------------------------------------------------------------- the designs
 
 def plant_of(plant):
     """A(ρ) = ∂f/∂x and B(ρ) = ∂f/∂u at rest, u*, and where ρ is in x; derived by hand from ẋ = f(x, u)."""
@@ -296,7 +299,8 @@ def plant_of(plant):
         # v̇ = (sin θ, -sin φ cos θ, cos φ cos θ) ΣF/m - (0, 0, g), ṙ = v,
         # ṗ = (F₂ - F₄)ℓ/I_x - …qr, q̇ = (F₃ - F₁)ℓ/I_y - …pr, ṙ = (F₁ - F₂ + F₃ - F₄)d/I_z - …pq,
         # φ̇ = (p cos ψ - q sin ψ)/cos θ, θ̇ = p sin ψ + q cos ψ, ψ̇ = r - (p cos ψ - q sin ψ) tan θ; at rest F = mg/4
-        keys = "mass_kg gravity_m_s2 inertia_x_kg_m2 inertia_y_kg_m2 inertia_z_kg_m2 arm_length_m drag_to_lift_m".split()
+        axes = [f"inertia_{axis}_kg_m2" for axis in "xyz"]
+        keys = ["mass_kg", "gravity_m_s2", *axes, "arm_length_m", "drag_to_lift_m"]
         require(all(plant[key] > 0 for key in keys), "a parameter of the quadrotor is not positive")
         mass, g, ix, iy, iz, arm, drag = (arb(plant[key]) for key in keys)
         g, by_mass, p, q, r = (ROUNDED * x for x in (g, 1 / mass, arm / ix, arm / iy, drag / iz))
@@ -373,13 +377,13 @@ class Design:
         else:
             require(schedule["kind"] == "vertices" and self.parameter is not None, "the schedule is not known")
             corners = itertools.product((-1.0, 1.0), repeat=len(schedule["weights"]["features"]))
-            require(sorted(map(tuple, schedule["weights"]["corners"])) == list(corners), "corners are not those of a box")
+            require(sorted(map(tuple, schedule["weights"]["corners"])) == list(corners), "they are no box's corners")
             for rho, gain in zip(rhos, gains):
                 off, size = self.schedule(0).at(arb(rho)) - arb_mat(gain), max(abs(x) for row in gain for x in row)
                 require(all(x.abs_upper() < 1e-3 * size for x in off.entries()), "the gain is far from the points'")
 
     def check_points(self):
-        """P (and F) of the points is that of the function up to rounding, the same data twice: PY = I, or the harmonics of P."""
+        """P (and F) of the points is that of the function up to rounding: PY = I, or P and F have its harmonics."""
         for point in self.points:
             symmetric(point["p"], self.n, "P of a point")
             if self.inverse:
@@ -390,9 +394,10 @@ class Design:
             given, count = [arb_mat(p[key]) for p in self.points if total], len(self.points)
             for k, s in itertools.product(range((count - 1) // 2 + 1), (0, 1)) if total else []:
                 waves = [(arb(p["rho"]) * k).sin_cos()[1 - s] for p in self.points]
-                fitted = sum((p * w for p, w in zip(given, waves)), arb_mat(*total.shape)) * (arb(2 if k else 1) / count)
-                off, size = fitted - total.terms.get((0, k, s), arb_mat(*total.shape)), max(given[0].entries(), key=abs)
-                require(all(x.abs_upper() < 1e-10 * abs(size) for x in off.entries()), "a harmonic is not that of the points")
+                zero, weight = arb_mat(*total.shape), arb(2 if k else 1) / count
+                off = sum((p * w for p, w in zip(given, waves)), zero) * weight - total.terms.get((0, k, s), zero)
+                size = max(abs(x) for x in given[0].entries())
+                require(all(x.abs_upper() < 1e-10 * size for x in off.entries()), "a harmonic is not the points'")
 
     def schedule(self, piece):
         """K on a piece: the cubic in t through the knots before, at both ends and after it; or Σ wᵢ(ρ)Kᵢ."""
@@ -441,8 +446,9 @@ class Design:
         V = xᵀPx:     -(P(A - BS) + ·ᵀ + ρ̇ P′) - ratio (Q + SᵀRS)
         V = xᵀY⁻¹x:   -(AY - BG + ·ᵀ) + ρ̇ Y′ - ratio (YQY + GᵀRG),  G = SY, between Y⁻¹
 
-        With flying = "rows" an input is f x + θ(k - f)x, 0 ≤ θ ≤ 1, and θ² ≤ θ: the form is at least that of S = F less Σ θ (dᵢx)(gᵢx),
-        d = k - f, g = ratio rᵢ(k + f) - 2bᵢᵀP; and (dx)(gx) ≤ ((g + cd)x)²/4c for c > 0, which borders: [M, δᵀ; δ, 4c], δ = g + cd.
+        With flying = "rows" an input is f x + θ(k - f)x, 0 ≤ θ ≤ 1, and θ² ≤ θ: the form is at least that of S = F less
+        Σ θ (dᵢx)(gᵢx), d = k - f, g = ratio rᵢ(k + f) - 2bᵢᵀP; and (dx)(gx) ≤ ((g + cd)x)²/4c for c > 0, which borders:
+        [M, δᵀ; δ, 4c], δ = g + cd.
         """
         w, q, r, (k, low) = self.lyapunov, Sum.constant(self.q), Sum.constant(self.r), self.gains(piece)
         of_k = lambda i: i not in self.saturating or (flying != "rows" and i in flying)
@@ -557,7 +563,7 @@ class Polytope:
             m -= (stage + stage.transpose()) / (2 * arb(claim["factor"]))
         return m
 
-# --------------------------------------------------------------------------------------------------------------- the claims
+# --------------------------------------------------------------------------------------------------------- the claims
 
 def check_premises(claims, claim, design):
     """Whether a claim rests on earlier claims of the right kind, about the same design, level and rate."""
@@ -565,7 +571,8 @@ def check_premises(claims, claim, design):
     require(sum((c["design"], c["kind"]) == (claim["design"], kind) for c in claims) == 1, "two claims are of one kind")
     limited = kind not in ("definite", "sampled") and bool(design.limited)
     falls = ["definite", "unsaturated"] if limited else ["definite"]
-    needed = {"definite": [], "sampled": [], "unsaturated": ["definite"], "decrease": falls, "cost": [*falls, "decrease"]}
+    needed = {"definite": [], "sampled": [], "unsaturated": ["definite"], "decrease": falls}
+    needed["cost"] = [*falls, "decrease"]
     require([premise["kind"] for premise in premises] == needed[kind], "it does not rest on what it has to")
     require(all(premise["design"] == claim["design"] for premise in premises), "a premise is of another design")
     if kind not in ("definite", "sampled"):
@@ -623,20 +630,23 @@ def check_motion(designs, claims, claim):
     """Whether the reference of a governor moves as the model does, but for a disturbance that the sets absorb.
 
     x_ref = x₀ + Σ s⁽ᵏ⁾ Z_kΔ and u_ref = Σ s⁽ᵏ⁾ (U_k + ρ̇V_k)Δ leave w = Σ s⁽ᵏ⁺¹⁾ R_kΔ + ρ̇ Σ s⁽ᵏ⁾ S_kΔ,
-    R_k = Z_k - AZ_{k+1} - BU_{k+1}, S_k = Z_k′ - BV_k. On V = γ: |2eᵀPw| ≤ 2√γ|w|/√y for Y ⪰ yI, and eᵀQe ≥ q|e|² ≥ qyγ for Q ⪰ qI,
-    so that |w| < q y^{3/2} √γ/(2 factor) leaves {V ≤ γ} invariant. Each state moves alone, by at most `farthest`, ρ by half a turn.
+    R_k = Z_k - AZ_{k+1} - BU_{k+1}, S_k = Z_k′ - BV_k. On V = γ: |2eᵀPw| ≤ 2√γ|w|/√y for Y ⪰ yI, and
+    eᵀQe ≥ q|e|² ≥ qyγ for Q ⪰ qI, so that |w| < q y^{3/2} √γ/(2 factor) leaves {V ≤ γ} invariant. Each state moves
+    alone, by at most `farthest`, ρ by half a turn.
     """
     outer, number = designs[claim["design"]], claim["design"]
     members = [outer] + [design for design in designs if design.line.get("inner_of") == number]
     supervisor, premises = outer.line["controller"]["supervisor"], [claims[k] for k in claim["premises"]]
     governor = supervisor["governor"]
     motion, states, rate = governor["motion"], governor["set_point_states"], governor["motion"]["parameter_rate"]
-    require([(p["kind"], p["design"]) for p in premises] == [("cost", m.line["design"]) for m in members], "a member's cost is missing")
+    costs = [("cost", member.line["design"]) for member in members]
+    require([(p["kind"], p["design"]) for p in premises] == costs, "a member's cost is missing")
     require(governor["operating_state"] == [0.0] * outer.n, "the reference does not rest where the plant does")
     inner = [member.line["controller"]["schedule"] for member in members[1:]]
     require([member["schedule"] for member in supervisor["inner"]] == inner, "inner gains differ from those that fly")
     for member, premise in zip(members, premises):
-        require(all(member.line[k] == outer.line[k] for k in ("plant", "weights")), "a member is of another plant, or weights")
+        for key in ("plant", "weights"):
+            require(member.line[key] == outer.line[key], f"a member has another {key}")
         for i, budget in enumerate(motion["input_budget"]):
             most = member.room(motion["actuators"], i)
             require(budget >= 0 and Fraction(budget) + member.sigma[i] <= most, "inputs exceed the actuators")
@@ -650,17 +660,20 @@ def check_motion(designs, claims, claim):
     require(not (outer.a @ z[0]).terms, "the plant does not rest wherever it is put")
     if outer.parameter is not None:
         off = function(motion["parameter_flow"], (1, outer.n)) - outer.a.rows([outer.parameter])
-        require(all(off.bound(0, j) < 1e-12 for j in range(outer.n)), "the reference's parameter moves otherwise than the plant's")
+        require(all(off.bound(0, j) < 1e-12 for j in range(outer.n)), "the parameter moves otherwise")
     along = [z[k] - outer.a @ z[k + 1] - outer.b @ u[k] for k in range(len(u))]
     across = [z[k + 1].by_rho() - outer.b @ v[k] for k in range(len(v))] + [Sum(z[0].shape, {})]
     worst = arb(0)
     for j, state in enumerate(states):
         move = arb.pi() if state == outer.parameter else arb(claim["farthest"])
-        # |s⁽ᵏ⁾| ≤ bₖ by the bounds on inputs, states and rate; a profile with lengths T₁ ≥ T₂ ≥ … has |s⁽ᵏ⁾| ≤ pₖ = 1/(T₁⋯Tₖ) ≤ b_m^{k/m}, m ≥ k
+        # |s⁽ᵏ⁾| ≤ bₖ by the bounds on inputs, states and rate; a profile with lengths T₁ ≥ T₂ ≥ … has
+        # |s⁽ᵏ⁾| ≤ pₖ = 1/(T₁⋯Tₖ) ≤ b_m^{k/m}, m ≥ k
         least = []
         for k in range(len(u)):
-            used = [(u[k].bound(i, j) + (rate * v[k].bound(i, j) if k < len(v) else 0), motion["input_budget"][i]) for i in range(outer.m)]
-            used += [(z[k + 1].bound(i, j), bound) for i, bound in enumerate(motion["state_bounds"]) if bound is not None]
+            turning = lambda i: rate * v[k].bound(i, j) if k < len(v) else 0
+            used = [(u[k].bound(i, j) + turning(i), motion["input_budget"][i]) for i in range(outer.m)]
+            bounded = [(i, bound) for i, bound in enumerate(motion["state_bounds"]) if bound is not None]
+            used += [(z[k + 1].bound(i, j), bound) for i, bound in bounded]
             if k == 0 and state == outer.parameter and governor["parameter_rate"] is not None:
                 used.append((arb(1), governor["parameter_rate"]))
             least.append(min((arb(bound) / (size * move) for size, bound in used if size > 0), default=None))
@@ -671,9 +684,11 @@ def check_motion(designs, claims, claim):
         rows = (sum((times(k, both(k, i)) for k in range(len(u))), arb(0)) * move for i in range(outer.n))
         worst = worst.max(sum((row**2 for row in rows), arb(0)).abs_upper().sqrt())
     for premise, bound in zip(premises, claim["bounds"], strict=True):
-        shifted = [[Fraction(x) - (Fraction(bound["q"]) if i == k else 0) for k, x in enumerate(row)] for i, row in enumerate(outer.q)]
+        shift = lambda i, k: Fraction(outer.q[i][k]) - (Fraction(bound["q"]) if i == k else 0)
+        shifted = [[shift(i, k) for k in range(outer.n)] for i in range(outer.n)]
         require(bound["q"] > 0 and bound["y"] > 0 and semidefinite(shifted, False), "Q is not above its bound")
-        absorbed = arb(bound["q"]) * arb(bound["y"]) ** arb(1.5) * arb(premise["level"]).sqrt() / (2 * arb(premise["factor"]))
+        root = (arb(bound["y"]) ** 3 * arb(premise["level"])).sqrt()
+        absorbed = arb(bound["q"]) * root / (2 * arb(premise["factor"]))
         require(worst < absorbed, f"the sets absorb {absorbed} and have to absorb {worst}")
 
 
@@ -706,7 +721,8 @@ def check_file(designs, path):
         require(same(mine, files), "the file has another design")
         return
     for k, design in enumerate(designs):  # one polytope, or one for each vertex
-        pairs = [(design.line[key], file["model"][key]) for key in "AB"] + [(design.line["weights"], file.get("weights"))]
+        pairs = [(design.line["weights"], file.get("weights"))]
+        pairs += [(design.line[key], file["model"][key]) for key in "AB"]
         pairs += [(design.line[key], file.get(key)) for key in "KFYL" if design.line.get(key) is not None]
         pairs += [([design.line["P"]], file["P"])] if design.common else []
         for mine, given in pairs:
@@ -714,7 +730,8 @@ def check_file(designs, path):
                 mine, given = [mine["q"], mine["r"]], [given["Q"], given["R"]]
             each = given if given is None or isinstance(given[0][0], list) else [given]
             first = k if len(designs) > 1 else 0
-            require(mine is each or all(same(x, each[(first + i) % len(each)]) for i, x in enumerate(mine)), "the file has another design")
+            is_same = mine is each or all(same(x, each[(first + i) % len(each)]) for i, x in enumerate(mine))
+            require(is_same, "the file has another design")
 
 WORK = {}
 

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Edits proof records and shows that the checker refuses every one: `edits.py RECORD …`.
 
-Half of the edits change one number and leave the digest as it was. The other half have the digest computed again: a number that
-contradicts another or that the cells do not prove, a cell that is missing, a gap, an exchanged premise, a dropped claim. (An edit
-that leaves a true statement that the record still proves, such as a larger bound of the cost, is no forgery and is not among them.)
+Half of the edits change one number and leave the digest as it was. The other half have the digest computed again: a
+number that contradicts another or that the cells do not prove, a cell that is missing, a gap, an exchanged premise, a
+dropped claim. (An edit that leaves a true statement that the record still proves, such as a larger bound of the cost,
+is no forgery and is not among them.)
 """
 import hashlib
 import json
@@ -152,7 +153,8 @@ def faster(rng, lines):
 
 
 def faster_altogether(rng, lines):
-    for claim in [c for c in claims(lines, "decrease", "cost") if float.fromhex(c.get("rate", "0x0p+0"))] or pick(rng, []):
+    moving = [c for c in claims(lines, "decrease", "cost") if float.fromhex(c.get("rate", "0x0p+0"))]
+    for claim in moving or pick(rng, []):
         claim["rate"] = scaled(claim["rate"], 3)
 
 
@@ -192,7 +194,8 @@ def other_knot(rng, lines):
 
 def weaker_gain_everywhere(rng, lines):
     design = pick(rng, designs(lines))
-    for container, key in [*numbers(design["controller"]["schedule"].get("gains", [])), *numbers([p["gain"] for p in design["points"]])]:
+    scheduled, points = design["controller"]["schedule"].get("gains", []), [p["gain"] for p in design["points"]]
+    for container, key in [*numbers(scheduled), *numbers(points)]:
         container[key] = scaled(container[key], -1.0)
     if design["controller"]["schedule"]["kind"] == "constant":
         design["controller"]["schedule"]["gain"] = design["points"][0]["gain"]
@@ -259,9 +262,10 @@ def other_weight_of_the_input(rng, lines):
 
 
 def less_room(rng, lines):
-    line = pick(rng, (line for line in lines[1:] if line.get("sigma") or line.get("controller", {}).get("limits", {}).get("max", [None])[0]))
-    bounds = line["sigma"] if "sigma" in line else line["controller"]["limits"]["max"]
-    bounds[0] = (0.5 * (float.fromhex(bounds[0]) + (float.fromhex(line["controller"]["operating_input"][0]) if "plant" in line else 0))).hex()
+    of = lambda line: line["controller"]["limits"]["max"] if "plant" in line else line.get("sigma") or [None]
+    line = pick(rng, (line for line in lines[1:] if "claim" not in line and of(line)[0]))
+    rest = float.fromhex(line["controller"]["operating_input"][0]) if "plant" in line else 0.0
+    of(line)[0] = (0.5 * (float.fromhex(of(line)[0]) + rest)).hex()
 
 
 def unsymmetric_sampled(rng, lines):
@@ -275,8 +279,9 @@ def indefinite_sampled(rng, lines):
 
 
 def mixtures_missing(rng, lines):
-    groups = pick(rng, (g for c in claims(lines, "decrease", "cost") for g in c.get("groups", []) if isinstance(g["variant"], list)))
-    groups["variant"] = [] if groups["variant"] else [0]
+    groups = (g for c in claims(lines, "decrease", "cost") for g in c.get("groups", []))
+    mixture = pick(rng, (g for g in groups if isinstance(g["variant"], list)))
+    mixture["variant"] = [] if mixture["variant"] else [0]
 
 
 def governor_of(rng, lines):
@@ -315,12 +320,13 @@ def other_inner_gain(rng, lines):
 
 
 FORGERIES = [
-    missing_cell, missing_cells_of_a_piece, gap, early_end, cells_of_another_piece, another_premise, premises_exchanged,
-    dropped_premise, dropped_claim, claim_twice, other_level, larger_set, faster, faster_altogether, cheaper, sampled_otherwise, sampled_slowly,
-    other_gain, other_gain_of_a_point, other_knot, weaker_gain_everywhere, unsymmetric_lyapunov, other_lyapunov_of_a_point,
-    other_lyapunov, indefinite_lyapunov, other_weight, larger_weight, other_plant, slimmer_plant, other_vertex,
-    other_weight_of_the_input, less_room, unsymmetric_sampled, indefinite_sampled, mixtures_missing, other_motion, other_flow,
-    more_authority, wider_sets, other_inner_gain,
+    missing_cell, missing_cells_of_a_piece, gap, early_end, cells_of_another_piece, another_premise,
+    premises_exchanged, dropped_premise, dropped_claim, claim_twice, other_level, larger_set, faster,
+    faster_altogether, cheaper, sampled_otherwise, sampled_slowly, other_gain, other_gain_of_a_point, other_knot,
+    weaker_gain_everywhere, unsymmetric_lyapunov, other_lyapunov_of_a_point, other_lyapunov, indefinite_lyapunov,
+    other_weight, larger_weight, other_plant, slimmer_plant, other_vertex, other_weight_of_the_input, less_room,
+    unsymmetric_sampled, indefinite_sampled, mixtures_missing, other_motion, other_flow, more_authority, wider_sets,
+    other_inner_gain,
 ]  # fmt: skip
 
 
