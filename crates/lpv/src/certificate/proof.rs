@@ -10,6 +10,7 @@
 //! and what is not.
 
 mod closed_loop;
+mod decrease;
 mod difference;
 mod enclosed;
 mod gain;
@@ -17,6 +18,7 @@ mod matrix;
 mod motion;
 mod nonlinear;
 mod polytopic;
+mod rowwise;
 mod sampled;
 mod weights;
 mod witness;
@@ -33,7 +35,8 @@ use crate::math::decimal::{about, at_least};
 use crate::math::interval::Interval;
 use crate::plant::Plant;
 use crate::synthesis::Design;
-use closed_loop::{ClosedLoop, Decrease, Place, Row};
+use closed_loop::{ClosedLoop, Place, Row};
+use decrease::DecreaseProof;
 use matrix::{CellMatrix, Definiteness};
 use rayon::prelude::*;
 use std::time::Instant;
@@ -291,7 +294,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
     let level = unsaturated(&closed_loop, &words, asked_level, is_claimed, &mut claims);
 
     let started = Instant::now();
-    let mut cells = Cells::new(closed_loop.pieces, closed_loop.mixtures(), |place| closed_loop.decrease(place));
+    let mut decrease = DecreaseProof::new(&closed_loop);
     let own = design.rate_bounded.as_ref().map(|bounded| bounded.rate);
     let asked = if closed_loop.has_parameter { options.rate.or(own) } else { Some(0.0) };
     let cost_factor = match (closed_loop.has_parameter, own) {
@@ -302,8 +305,8 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
     let mut reached = [None, None];
     for (place, (cost, factor)) in [(0.0, 1.0), (1.0, cost_factor)].into_iter().enumerate() {
         let (rate, attempt) = match asked {
-            Some(rate) => (rate, decrease(&mut cells, LEAST_HALF, rate, factor, cost)),
-            None => largest_rate(&mut cells, factor, cost),
+            Some(rate) => (rate, decrease.at(rate, [factor, cost])),
+            None => decrease.largest_rate([factor, cost]),
         };
         if let Attempt::Proved(_) = attempt {
             reached[place] = Some(rate);
@@ -325,7 +328,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
             (Attempt::Refuted { place, .. } | Attempt::Open { place, .. }, _) => closed_loop.costs_more(place, factor),
             _ => None,
         };
-        let mut claim = words.claim(kind, attempt, &closed_loop, cells.len(), started).resting_on(premises);
+        let mut claim = words.claim(kind, attempt, &closed_loop, decrease.cells(), started).resting_on(premises);
         claim = claim.refuted_by(witness);
         if asked.is_none() && claim.verdict == Verdict::Refuted {
             // nobody claimed it: with the gain between the grid points this P is no bound even at rest, another may be
@@ -335,7 +338,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         claims.push(claim);
     }
     if let (Some(rate), None) = (options.rate.filter(|_| closed_loop.has_parameter), reached[0]) {
-        let (found, attempt) = largest_rate(&mut cells, 1.0, 0.0);
+        let (found, attempt) = decrease.largest_rate([1.0, 0.0]);
         let proved = matches!(attempt, Attempt::Proved(_)).then_some(found);
         claims.push(Claim::new(ClaimKind::AsAsked { what: "rate", asked: rate, proved }, Of::Model, &words));
     }
@@ -465,38 +468,4 @@ fn unsaturated(
         claims.push(Claim::new(kind, Of::Model, words));
     }
     Some(level)
-}
-
-/// κ(constant ± r rate) + c cost ≻ 0 on every cell.
-fn decrease(cells: &mut Cells<Decrease>, least: f64, rate: f64, factor: f64, cost: f64) -> Attempt {
-    cells.prove(least, &|parts: &Decrease, half| {
-        let ends = if rate == 0.0 { vec![0.0] } else { vec![-rate, rate] };
-        let of_end = |end: f64| {
-            let terms = [(factor, &parts.constant), (factor * end, &parts.rate), (cost, &parts.cost)];
-            (end, CellMatrix::combination(&terms).is_positive(half))
-        };
-        ends.into_iter().map(of_end).collect()
-    })
-}
-
-/// The largest rate for which [`decrease`] is proved, by bisection; the attempt at rest where even that fails.
-fn largest_rate(cells: &mut Cells<Decrease>, factor: f64, cost: f64) -> (f64, Attempt) {
-    let mut best = (0.0, decrease(cells, LEAST_HALF_OF_SEARCH, 0.0, factor, cost));
-    if !matches!(best.1, Attempt::Proved(_)) {
-        return best;
-    }
-    let [mut rate, most] = RATES;
-    let mut fails = f64::INFINITY;
-    while fails / best.0.max(RATES[0]) > RATE_RATIO && rate <= most {
-        match decrease(cells, LEAST_HALF_OF_SEARCH, rate, factor, cost) {
-            proved @ Attempt::Proved(_) => best = (rate, proved),
-            _ => fails = rate,
-        }
-        rate = match fails.is_finite() {
-            true if best.0 == 0.0 => return best,
-            true => (best.0 * fails).sqrt(),
-            false => 8.0 * rate,
-        };
-    }
-    best
 }

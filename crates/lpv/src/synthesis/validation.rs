@@ -265,7 +265,11 @@ fn definite(key: &str, matrix: &Mat<f64>, size: usize, or_singular: bool) -> Res
 fn same_grid(key: &str, found: &[f64], scheduling: Option<&Scheduling>) -> Result<(), DesignError> {
     let expected = parameter_grid(scheduling, found.len());
     if expected.len() != found.len() {
-        return refuse(key, format!("has {} values", found.len()), format!("as many as the plant's grid, {}", expected.len()));
+        return refuse(
+            key,
+            format!("has {} values", found.len()),
+            format!("as many as the plant's grid, {}", expected.len()),
+        );
     }
     match expected.iter().zip(found).position(|(a, b)| a != b) {
         Some(at) => refuse(

@@ -110,6 +110,9 @@ pub(super) fn prove(
     if !closed_loop.rests_at_every_parameter() {
         return undecided("the operating point moves with the parameter, or is not at rest");
     }
+    let Some(mixtures) = closed_loop.mixtures() else {
+        return undecided("too many inputs may saturate for all mixtures of their rows to be tried");
+    };
     let Some(unit) = closed_loop.unit_bounds() else { return undecided("the box around the set could not be proved") };
     let decreases = |level: f64, what: Decreases, least: f64| {
         let Some(remainder) = closed_loop.remainder(&unit.times(level.sqrt())) else {
@@ -118,13 +121,13 @@ pub(super) fn prove(
         };
         let enclose = |place: &Place| closed_loop.nonlinear(place, &remainder, what);
         let judge = |cell: &NonlinearCell, half: f64| cell.is_decreasing(what, half);
-        let mut cells = Cells::new(closed_loop.pieces, closed_loop.mixtures(), enclose);
+        let mut cells = Cells::new(closed_loop.pieces, mixtures, enclose);
         let attempt = cells.prove(least, &judge);
         let rate = remainder.differences.iter().map(|difference| difference.rate.magnitude()).fold(0.0, f64::max);
         (attempt, cells.len(), rate)
     };
     let invariant = Decreases { factor: 1.0, cost: 0.0 };
-    let unsaturated = if closed_loop.mixtures() > 1 { f64::INFINITY } else { closed_loop.level_within_limits(&unit) };
+    let unsaturated = if mixtures > 1 { f64::INFINITY } else { closed_loop.level_within_limits(&unit) };
     let most_is_unsaturated = most.is_some();
     let most = most.unwrap_or(MOST_LEVEL).min(unit.most_level()).min(unsaturated);
     let proved =
