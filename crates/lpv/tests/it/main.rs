@@ -11,5 +11,6 @@ mod moving_parameter;
 mod polytopic;
 mod proofs;
 mod quadrotor;
+mod rowwise;
 mod synthesis;
 mod tensor_product;
