@@ -15,8 +15,6 @@ use lpv::synthesis::polytopic::InputBounds;
 use serde::Deserialize;
 
 type Rows = Vec<Vec<f64>>;
-/// Inputs of a high-gain design: there are 2^m mixtures.
-const MOST_HIGH_GAIN_INPUTS: usize = 10;
 /// Relative difference of what a file says twice: inverses are no better.
 const REPEATED: f64 = 1e-6;
 /// Relative size of what the sum of a rate vertex may be.
@@ -133,8 +131,8 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
     };
     let saturation = saturation(door, &file, region, m)?;
     let auxiliary_gain = sized("F", &file.f, [m, n])?;
-    if auxiliary_gain.is_some() && (m > MOST_HIGH_GAIN_INPUTS || saturation.is_none()) {
-        return door.refuse("F", format!("needs sigma and gamma, and at most {MOST_HIGH_GAIN_INPUTS} inputs"));
+    if auxiliary_gain.is_some() && saturation.is_none() {
+        return door.refuse("F", "needs sigma and gamma: a gain that saturates nowhere needs no second one");
     }
     let p = sized("P", &file.p, [n, n])?;
     let same = p.as_ref().is_some_and(|p| p.iter().all(|other| *other == p[0]));

@@ -10,6 +10,7 @@
 //! and what is not.
 
 mod closed_loop;
+mod decrease;
 mod difference;
 mod enclosed;
 mod gain;
@@ -40,10 +41,10 @@ use crate::math::decimal::{about, at_least};
 use crate::math::interval::Interval;
 use crate::plant::Plant;
 use crate::synthesis::Design;
-use closed_loop::{ClosedLoop, Decrease, Place, Row};
+use closed_loop::{ClosedLoop, Place, Row};
+use decrease::DecreaseProof;
 use matrix::{CellMatrix, Definiteness};
 use rayon::prelude::*;
-use rowwise::{Claimed, Decreasing};
 use std::time::Instant;
 
 /// Half-widths of cells, in pieces, below which no narrower one is tried: for a claim that is asked for, and while the
@@ -66,8 +67,6 @@ pub const COST_INFLATION: f64 = 1.1;
 pub const COST_INFLATION_RATE_BOUNDED: f64 = 1.01;
 /// Rates are found to this factor.
 const RATE_RATIO: f64 = 1.03;
-/// Mixtures of rows that are tried where the row-wise inequality is not proved and nothing was asked for.
-const FEW_MIXTURES: usize = 4;
 /// Rates outside are not sought.
 const RATES: [f64; 2] = [1e-4, 1e5];
 
@@ -300,6 +299,8 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
     let is_claimed = options.level.is_some() || design.rate_bounded.is_some() || !closed_loop.has_parameter;
     let level = unsaturated(&closed_loop, &words, asked_level, is_claimed, &mut claims);
 
+    let started = Instant::now();
+    let mut decrease = DecreaseProof::new(&closed_loop);
     let own = design.rate_bounded.as_ref().map(|bounded| bounded.rate);
     let asked = if closed_loop.has_parameter { options.rate.or(own) } else { Some(0.0) };
     let cost_factor = match (closed_loop.has_parameter, own) {
@@ -307,11 +308,12 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         (true, Some(_)) => COST_INFLATION_RATE_BOUNDED,
         (true, None) => COST_INFLATION,
     };
-    let mut search = Search { closed_loop: &closed_loop, mixtures: None };
     let mut reached = [None, None];
     for (place, (cost, factor)) in [(0.0, 1.0), (1.0, cost_factor)].into_iter().enumerate() {
-        let started = Instant::now();
-        let (rate, attempt, cells) = search.decreases(Claimed { factor, cost }, asked);
+        let (rate, attempt) = match asked {
+            Some(rate) => (rate, decrease.at(rate, [factor, cost])),
+            None => decrease.largest_rate([factor, cost]),
+        };
         if let Attempt::Proved(_) = attempt {
             reached[place] = Some(rate);
         }
@@ -332,7 +334,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
             (Attempt::Refuted { place, .. } | Attempt::Open { place, .. }, _) => closed_loop.costs_more(place, factor),
             _ => None,
         };
-        let mut claim = words.claim(kind, attempt, &closed_loop, cells, started).resting_on(premises);
+        let mut claim = words.claim(kind, attempt, &closed_loop, decrease.cells(), started).resting_on(premises);
         claim = claim.refuted_by(witness);
         if asked.is_none() && claim.verdict == Verdict::Refuted {
             // nobody claimed it: with the gain between the grid points this P is no bound even at rest, another may be
@@ -342,7 +344,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         claims.push(claim);
     }
     if let (Some(rate), None) = (options.rate.filter(|_| closed_loop.has_parameter), reached[0]) {
-        let (found, attempt, _) = search.decreases(Claimed { factor: 1.0, cost: 0.0 }, None);
+        let (found, attempt) = decrease.largest_rate([1.0, 0.0]);
         let proved = matches!(attempt, Attempt::Proved(_)).then_some(found);
         claims.push(Claim::new(ClaimKind::AsAsked { what: "rate", asked: rate, proved }, Of::Model, &words));
     }
@@ -478,69 +480,4 @@ fn unsaturated(
         claims.push(Claim::new(kind, Of::Model, words));
     }
     Some(level)
-}
-
-/// The decreases of a loop; cells of one claim serve the next.
-struct Search<'a> {
-    closed_loop: &'a ClosedLoop<'a>,
-    mixtures: Option<Cells<'a, Decrease>>,
-}
-
-impl Search<'_> {
-    /// What is proved of a decrease at the rate `asked`, or at the largest that is found; with the number of cells. Where inputs may
-    /// saturate by the row-wise inequality, and where that does not do, by all mixtures of rows if they are few.
-    fn decreases(&mut self, claimed: Claimed, asked: Option<f64>) -> (f64, Attempt, usize) {
-        let closed_loop = self.closed_loop;
-        if !closed_loop.saturating().is_empty() {
-            let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| closed_loop.row_wise(place, claimed));
-            let found = at_rate(&mut cells, claimed, asked);
-            // a search for what nobody claimed does not pay for many mixtures
-            let are_few = closed_loop.mixtures().is_some_and(|count| asked.is_some() || count <= FEW_MIXTURES);
-            if matches!(found.1, Attempt::Proved(_)) || !are_few {
-                return found;
-            }
-        }
-        let mixtures = closed_loop.mixtures().unwrap_or(1);
-        let all = || Cells::new(closed_loop.pieces, mixtures, |place: &Place| closed_loop.decrease(place));
-        at_rate(self.mixtures.get_or_insert_with(all), claimed, asked)
-    }
-}
-
-/// At the rate that is asked for, or the largest.
-fn at_rate<M: Decreasing>(cells: &mut Cells<M>, claimed: Claimed, asked: Option<f64>) -> (f64, Attempt, usize) {
-    let (rate, attempt) = match asked {
-        Some(rate) => (rate, decrease(cells, LEAST_HALF, rate, claimed)),
-        None => largest_rate(cells, claimed),
-    };
-    (rate, attempt, cells.len())
-}
-
-/// The decrease at both ends of the rates, on every cell.
-fn decrease<M: Decreasing>(cells: &mut Cells<M>, least: f64, rate: f64, claimed: Claimed) -> Attempt {
-    cells.prove(least, &|parts: &M, half| {
-        let ends = if rate == 0.0 { vec![0.0] } else { vec![-rate, rate] };
-        ends.into_iter().map(|end| (end, parts.is_decreasing(end, claimed, half))).collect()
-    })
-}
-
-/// The largest rate for which [`decrease`] is proved, by bisection; the attempt at rest where even that fails.
-fn largest_rate<M: Decreasing>(cells: &mut Cells<M>, claimed: Claimed) -> (f64, Attempt) {
-    let mut best = (0.0, decrease(cells, LEAST_HALF_OF_SEARCH, 0.0, claimed));
-    if !matches!(best.1, Attempt::Proved(_)) {
-        return best;
-    }
-    let [mut rate, most] = RATES;
-    let mut fails = f64::INFINITY;
-    while fails / best.0.max(RATES[0]) > RATE_RATIO && rate <= most {
-        match decrease(cells, LEAST_HALF_OF_SEARCH, rate, claimed) {
-            proved @ Attempt::Proved(_) => best = (rate, proved),
-            _ => fails = rate,
-        }
-        rate = match fails.is_finite() {
-            true if best.0 == 0.0 => return best,
-            true => (best.0 * fails).sqrt(),
-            false => 8.0 * rate,
-        };
-    }
-    best
 }

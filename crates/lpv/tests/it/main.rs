@@ -12,5 +12,6 @@ mod polytopic;
 mod proofs;
 mod quadrotor;
 mod records;
+mod rowwise;
 mod synthesis;
 mod tensor_product;

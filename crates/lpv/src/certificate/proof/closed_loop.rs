@@ -1,7 +1,7 @@
 //! The closed LPV loop and its Lyapunov function over the continuous range of the parameter, as enclosures on cells.
 
 use super::matrix::{CellMatrix, TaylorMatrix};
-use super::rowwise::MOST_ENUMERATED;
+use super::rowwise::{self, Balanced, Rows, mixed, multipliers, shares};
 use crate::certificate::claim::Motion;
 use crate::controller::{InputLimits, Schedule};
 use crate::math::Mat;
@@ -13,8 +13,6 @@ use crate::model::MatrixFunction;
 use crate::plant::{Description, Plant};
 use crate::synthesis::{CostWeights, Design};
 
-/// The mixture of rows of K alone, however many inputs there are.
-pub(super) const ALL_HIGH: usize = usize::MAX;
 /// Pieces that the circle is cut into where the gain is one formula everywhere.
 const PIECES: usize = 16;
 /// Harmonics of P smaller than this, against its largest entry, are rounding errors.
@@ -99,6 +97,14 @@ pub(super) struct Decrease {
     pub cost: CellMatrix,
 }
 
+/// The decrease under saturation on a cell: still + κρ̇ rate ≻ 0, with κ and c within `still`.
+pub(super) struct ByRows {
+    pub still: CellMatrix,
+    pub rate: CellMatrix,
+    /// cᵢ
+    pub multipliers: Vec<f64>,
+}
+
 /// The matrices of the claims as functions of the cell's variable, for one mixture of rows.
 pub(super) struct Parts {
     /// −(P(A − BS) + ·ᵀ), or −((AY − BSY) + ·ᵀ)
@@ -181,10 +187,14 @@ impl<'a> ClosedLoop<'a> {
         (0..self.inputs()).filter(|&i| self.may_saturate(i)).collect()
     }
 
-    /// Number of mixtures of the rows of K and F, two for each input that may saturate; `None` where they are too many to enumerate.
+    /// Number of mixtures of the rows of K and F: two for each input that may saturate; `None` where there are too many to enumerate.
     pub fn mixtures(&self) -> Option<usize> {
-        let count = self.saturating().len();
-        (count <= MOST_ENUMERATED).then(|| 1 << count)
+        rowwise::mixtures(self.saturating().len())
+    }
+
+    /// Whether the mixture is K itself.
+    pub fn is_all_of_k(&self, mixture: usize) -> bool {
+        mixture == rowwise::ALL_HIGH || Some(mixture + 1) == self.mixtures()
     }
 
     /// How the parameter moves at up to `rate`.
@@ -249,46 +259,83 @@ impl<'a> ClosedLoop<'a> {
 
     /// The parts of the decrease with the mixture number `mixture`, over `t` of piece `piece`.
     pub fn parts(&self, piece: usize, mixture: usize, t: Taylor) -> Parts {
-        self.parts_weighted(piece, mixture, t, &self.weights.r)
+        let (a, b, k) = self.model_and_gain(piece, t);
+        self.parts_of(&a, &b, &self.gains(k, mixture, t), &self.weights.r, t)
     }
 
-    /// The same with another R.
-    pub fn parts_weighted(&self, piece: usize, mixture: usize, t: Taylor, r: &Mat<f64>) -> Parts {
+    /// S of a mixture, and K; in the inverse form SY and KY.
+    fn gains(&self, k: TaylorMatrix, mixture: usize, t: Taylor) -> [TaylorMatrix; 2] {
         let rho = self.rho(t);
-        let (n, m) = (self.weights.q.nrows(), self.inputs());
-        let (a, b, k) = self.model_and_gain(piece, t);
-        let CostWeights { q, .. } = self.weights;
-        // an input that is not limited is always the one of K; the bits of many inputs are all low or all high
-        let is_low = |bit: usize| mixture != ALL_HIGH && mixture.checked_shr(bit as u32).unwrap_or(0) & 1 == 0;
-        let saturating = self.saturating();
-        let is_saturated =
-            |i: usize| saturating.iter().position(|&other| other == i).is_some_and(|bit| is_low(bit));
-        let mixed = |k: TaylorMatrix, f: Option<TaylorMatrix>| match f {
-            None => k,
-            Some(f) => TaylorMatrix::from_fn(m, n, |i, j| if is_saturated(i) { f.at(i, j) } else { k.at(i, j) }),
+        let high = match &self.form {
+            Form::Direct(_) => k,
+            Form::Inverse(y) => k.times(&TaylorMatrix::of_function(y, rho)),
         };
-        let auxiliary = self.auxiliary.as_ref().map(|f| TaylorMatrix::of_function(f, rho));
+        // an input that is not limited is always the one of K
+        let low = self.auxiliary.as_ref().map(|f| TaylorMatrix::of_function(f, rho));
+        let s = low.map(|low| mixed(mixture, &self.saturating(), &low, &high));
+        [s.unwrap_or_else(|| high.clone()), high]
+    }
+
+    /// The parts of the decrease with the gain S = `gains[0]` (or SY), and with `r` for R.
+    fn parts_of(
+        &self,
+        a: &TaylorMatrix,
+        b: &TaylorMatrix,
+        [s, _]: &[TaylorMatrix; 2],
+        r: &Mat<f64>,
+        t: Taylor,
+    ) -> Parts {
+        let (rho, q) = (self.rho(t), &self.weights.q);
         match &self.form {
             Form::Direct(p) => {
                 let [p, p_rate] = TaylorMatrix::of_function_and_derivative(p, rho);
-                let s = mixed(k, auxiliary);
-                let flow = p.times(&b.times(&s).minus(&a));
+                let flow = p.times(&b.times(s).minus(a));
                 Parts {
                     constant: flow.plus(&flow.transpose()),
                     rate: p_rate.negated(),
                     cost: s.quadratic(r).plus(&TaylorMatrix::constant(q)).negated(),
                     lyapunov: p,
-                    gain: s,
+                    gain: s.clone(),
                 }
             }
             Form::Inverse(y) => {
                 let [y, y_rate] = TaylorMatrix::of_function_and_derivative(y, rho);
-                let sy = mixed(k.times(&y), auxiliary);
-                let flow = b.times(&sy).minus(&a.times(&y));
-                let cost = sy.quadratic(r).plus(&y.quadratic(q)).negated();
-                Parts { constant: flow.plus(&flow.transpose()), rate: y_rate, cost, lyapunov: y, gain: sy }
+                let flow = b.times(s).minus(&a.times(&y));
+                let cost = s.quadratic(r).plus(&y.quadratic(q)).negated();
+                Parts { constant: flow.plus(&flow.transpose()), rate: y_rate, cost, lyapunov: y, gain: s.clone() }
             }
         }
+    }
+
+    /// The decrease with weights κ and c under saturation of all inputs that may saturate, by rows (see [`rowwise`]).
+    pub fn by_rows(&self, place: &Place, weights: [f64; 2], r: &Mat<f64>) -> ByRows {
+        let Place { piece, middle, half, .. } = *place;
+        let over =
+            self.parts_and_rows(piece, Taylor::variable(Interval::new(middle - half, middle + half)), weights, r);
+        let middle = self.parts_and_rows(piece, Taylor::variable_of_first_order(Interval::point(middle)), weights, r);
+        let decrease = Decrease::new(&over.0, &middle.0);
+        let [factor, cost] = weights;
+        let unsaturated = CellMatrix::combination(&[(factor, &decrease.constant), (cost, &decrease.cost)]);
+        let [gradient, difference] = middle.1.middle();
+        let multipliers = multipliers(&[Balanced { base: unsaturated.middle(), gradient, difference }]);
+        let (moving, shares) = (over.1.moving(), shares(&multipliers));
+        let lost = |rows: &Rows| rows.deltas(&multipliers, &moving).quadratic(&shares);
+        let lost = CellMatrix::new(&lost(&middle.1), &lost(&over.1));
+        let still = CellMatrix::combination(&[(1.0, &unsaturated), (-1.0, &lost)]);
+        ByRows { still, rate: decrease.rate, multipliers }
+    }
+
+    /// The parts of the decrease with the low gain, and what saturation adds to it.
+    fn parts_and_rows(&self, piece: usize, t: Taylor, weights: [f64; 2], r: &Mat<f64>) -> (Parts, Rows) {
+        let (a, b, k) = self.model_and_gain(piece, t);
+        let gains = self.gains(k, 0, t);
+        let parts = self.parts_of(&a, &b, &gains, r, t);
+        let input = match &self.form {
+            Form::Direct(_) => b.transpose().times(&parts.lyapunov),
+            Form::Inverse(_) => b.transpose(),
+        };
+        let rows = Rows::new(&self.saturating(), &input, [&gains[0], &gains[1]], r, weights);
+        (parts, rows)
     }
 
     /// The parts over the whole cell, and their values and slopes in its middle.

@@ -111,7 +111,7 @@ pub(super) fn prove(
         return undecided("the operating point moves with the parameter, or is not at rest");
     }
     let Some(mixtures) = closed_loop.mixtures() else {
-        return undecided("too many inputs saturate to try all of their mixtures");
+        return undecided("too many inputs may saturate for all mixtures of their rows to be tried");
     };
     let Some(unit) = closed_loop.unit_bounds() else { return undecided("the box around the set could not be proved") };
     let decreases = |level: f64, what: Decreases, least: f64| {

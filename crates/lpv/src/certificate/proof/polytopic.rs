@@ -9,10 +9,12 @@
 //!
 //! for S of rows of K and F (or of L and FY). It is proved by Mᵢᵢ ≻ 0 and Mᵢⱼ + Mⱼᵢ ≻ 0 (the thesis's (A.10)), each in interval
 //! arithmetic; with the cost, Q and R enter by their Schur complement, which for the pair (i, j) subtracts
-//! ½(Yᵢ + Yⱼ)Q(Yᵢ + Yⱼ) + ½(Sᵢ + Sⱼ)ᵀR(Sᵢ + Sⱼ), or 2Q and the second term. A box of several parameters is the polytope of
+//! ½(Yᵢ + Yⱼ)Q(Yᵢ + Yⱼ) + ½(Sᵢ + Sⱼ)ᵀR(Sᵢ + Sⱼ), or 2Q and the second term. Where inputs may saturate, S = F and what `rowwise.rs`
+//! subtracts come first; mixtures are for a few inputs where that does not prove. A box of several parameters is the polytope of
 //! its corners.
 
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::rowwise::{Balanced, Rows, mixed, mixtures, multipliers, separable, shares};
 use super::weights;
 use super::witness::{Broken, Loop, form, image, inverse};
 use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Witness, Words, settle};
@@ -130,8 +132,8 @@ struct Condition {
     at: TaylorMatrix,
     weights: Vec<f64>,
     rates: Vec<f64>,
-    /// Bits of the inputs that fly K.
-    mixture: usize,
+    /// `at` is of the gain that flies, unsaturated.
+    is_motion: bool,
 }
 
 impl<'a> Sums<'a> {
@@ -202,7 +204,7 @@ impl<'a> Sums<'a> {
             at: matrix.clone(),
             weights: self.vertex(i),
             rates: Vec::new(),
-            mixture: 0,
+            is_motion: true,
         };
         if self.claim.lyapunov.matrices().iter().any(|matrix| asymmetry(matrix).is_some()) {
             // V is not a quadratic form of these numbers
@@ -230,7 +232,13 @@ impl<'a> Sums<'a> {
                 (r, 0) => row(r - 1),
                 (r, c) => matrix.at(r - 1, c - 1),
             });
-            Condition { at: bordered.clone(), matrix: bordered, weights: self.vertex(i), rates: Vec::new(), mixture: 0 }
+            Condition {
+                at: bordered.clone(),
+                matrix: bordered,
+                weights: self.vertex(i),
+                rates: Vec::new(),
+                is_motion: true,
+            }
         });
         let conditions: Vec<Condition> = conditions.collect();
         let kind = ClaimKind::Unsaturated { level: gamma };
@@ -241,29 +249,34 @@ impl<'a> Sums<'a> {
         .resting_on(&["lyapunov-definite"])
     }
 
-    /// κM − (cost) ≻ 0 for vertices, pairs, rates and mixtures.
+    /// κM − (cost) ≻ 0 for vertices, pairs and rates: by rows where inputs may saturate, and where that does not prove, for every mixture
+    /// of the rows of a few.
     fn decrease(&self, kind: ClaimKind, level: Option<f64>, cost: Option<(f64, &CostWeights)>) -> Claim {
         let started = Instant::now();
         let (factor, weights) = cost.map_or((1.0, None), |(factor, weights)| (factor, Some(weights)));
         let saturating = self.saturating();
-        let mut conditions = Vec::new();
-        for mixture in 0..1_usize << saturating.len() {
-            let s = self.mixed(mixture, &saturating);
-            for rates in &self.rates {
-                for i in 0..self.len() {
-                    for j in i..self.len() {
-                        conditions.push(Condition { mixture, ..self.pair([i, j], &s, rates, factor, weights) });
-                    }
-                }
+        let decided = |conditions: &[Condition]| {
+            decide(kind.clone(), started, conditions, |condition, direction, value| match cost {
+                // a mixture of rows is no motion
+                None if condition.is_motion => self.leaves(condition, direction, value, level),
+                None => None,
+                Some((factor, weights)) => self.costs_more(condition, factor, weights),
+            })
+        };
+        let by_rows = (!saturating.is_empty()).then(|| decided(&self.by_rows(&saturating, factor, weights)));
+        let claim = match (by_rows, mixtures(saturating.len())) {
+            (Some(claim), _) if claim.verdict != Verdict::Undecided => claim,
+            (Some(claim), None) => claim,
+            (_, count) => {
+                let count = count.unwrap_or(1);
+                let of_mixture = |mixture: usize| {
+                    let s = self.mixed(mixture, &saturating);
+                    let of = self.conditions(&s, factor, weights);
+                    of.into_iter().map(move |c| Condition { is_motion: mixture + 1 == count, ..c })
+                };
+                decided(&(0..count).flat_map(of_mixture).collect::<Vec<Condition>>())
             }
-        }
-        let all_of_k = (1_usize << saturating.len()) - 1;
-        let claim = decide(kind, started, &conditions, |condition, direction, value| match cost {
-            // a mixture of rows is no motion
-            None if condition.mixture == all_of_k => self.leaves(condition, direction, value, level),
-            None => None,
-            Some((factor, weights)) => self.costs_more(condition, factor, weights),
-        });
+        };
         let mut premises = vec!["lyapunov-definite"];
         premises.extend(weights.map(|_| "weights"));
         premises.extend(level.map(|_| "unsaturated"));
@@ -345,15 +358,58 @@ impl<'a> Sums<'a> {
         self.rates.iter().any(|a| self.rates.iter().any(|b| is_opposite(a, b)))
     }
 
-    /// Rows of K (bit set) and of F, or of L and FY.
+    /// Rows of K and of F, or of L and FY.
     fn mixed(&self, mixture: usize, saturating: &[usize]) -> Vec<TaylorMatrix> {
         let Some(low) = &self.auxiliary else { return self.gain.clone() };
-        let (m, n) = (self.claim.polytope.inputs(), self.claim.polytope.states());
-        let is_low = |i: usize| saturating.iter().position(|&s| s == i).is_some_and(|bit| mixture >> bit & 1 == 0);
-        let row = |(k, f): (&TaylorMatrix, &TaylorMatrix)| {
-            TaylorMatrix::from_fn(m, n, |i, j| if is_low(i) { f.at(i, j) } else { k.at(i, j) })
+        self.gain.iter().zip(low).map(|(k, f)| mixed(mixture, saturating, f, k)).collect()
+    }
+
+    /// The conditions with the gains `s`, unsaturated.
+    fn conditions(&self, s: &[TaylorMatrix], factor: f64, cost: Option<&CostWeights>) -> Vec<Condition> {
+        let pair = |pair: [usize; 2], rates: &Vec<f64>| self.pair(pair, s, rates, factor, cost);
+        self.rates.iter().flat_map(|rates| self.pairs().map(move |at| pair(at, rates))).collect()
+    }
+
+    /// Pairs of vertices, each with itself too.
+    fn pairs(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let count = self.len();
+        (0..count).flat_map(move |i| (i..count).map(move |j| [i, j]))
+    }
+
+    /// The conditions under saturation, see `rowwise.rs`: δᵢ is affine in ρ, so that Σ δᵢᵀδᵢ/(4cᵢ) is a double sum too. Halfway stands the
+    /// loop of K, which moves so.
+    fn by_rows(&self, saturating: &[usize], factor: f64, cost: Option<&CostWeights>) -> Vec<Condition> {
+        let m = self.claim.polytope.inputs();
+        let r = cost.map_or_else(|| Mat::zeros(m, m), |weights| separable(&weights.r, saturating));
+        let bound = cost.map(|weights| CostWeights { q: weights.q.clone(), r: r.clone() });
+        let low = self.mixed(0, saturating);
+        let rows: Vec<Rows> = (0..self.len())
+            .map(|i| {
+                let b = TaylorMatrix::constant(self.claim.polytope.b(i)).transpose();
+                let input = if self.is_common() { b.times(self.lyapunov(0)) } else { b };
+                let weights = [factor, f64::from(u8::from(cost.is_some()))];
+                Rows::new(saturating, &input, [&low[i], &self.gain[i]], &r, weights)
+            })
+            .collect();
+        let conditions = self.conditions(&low, factor, bound.as_ref());
+        let pairs: Vec<[usize; 2]> = self.rates.iter().flat_map(|_| self.pairs()).collect();
+        let multipliers = multipliers(&balanced(&conditions, &pairs, &rows));
+        let moving: Vec<bool> =
+            (0..saturating.len()).map(|input| rows.iter().any(|rows| rows.moving()[input])).collect();
+        let deltas: Vec<TaylorMatrix> = rows.iter().map(|rows| rows.deltas(&multipliers, &moving)).collect();
+        let weighted: Vec<TaylorMatrix> =
+            deltas.iter().map(|delta| TaylorMatrix::constant(&shares(&multipliers)).times(delta)).collect();
+        let lost = |[i, j]: [usize; 2]| {
+            let product = deltas[i].transpose().times(&weighted[j]);
+            if i == j { product } else { product.plus(&product.transpose()) }
         };
-        self.gain.iter().zip(low).map(row).collect()
+        let of_high = self.conditions(&self.gain, factor, cost);
+        let under_saturation = |((low, high), &pair): ((Condition, Condition), &[usize; 2])| Condition {
+            matrix: low.matrix.minus(&lost(pair)),
+            is_motion: true,
+            ..high
+        };
+        conditions.into_iter().zip(of_high).zip(&pairs).map(under_saturation).collect()
     }
 
     /// P or Yᵢ.
@@ -416,8 +472,21 @@ impl<'a> Sums<'a> {
             at = less(ii.plus(&jj).plus(&both), 1.0);
             matrix = less(both, 0.5);
         }
-        Condition { matrix, at, weights: halfway, rates: rates_of_claim, mixture: 0 }
+        Condition { matrix, at, weights: halfway, rates: rates_of_claim, is_motion: true }
     }
+}
+
+/// The matrices of vertices and pairs as numbers, with the rows that take from them.
+fn balanced(conditions: &[Condition], pairs: &[[usize; 2]], rows: &[Rows]) -> Vec<Balanced> {
+    let numbers: Vec<[Mat<f64>; 2]> = rows.iter().map(Rows::middle).collect();
+    let of_pair = |(condition, &[i, j]): (&Condition, &[usize; 2])| {
+        // ¼(2δ)² of a vertex, and at most ½(δᵢ + δⱼ)² of a pair
+        let share = if i == j { 0.5 } else { 0.5_f64.sqrt() };
+        let mean = |of: usize| share * (&numbers[i][of] + &numbers[j][of]);
+        let base = CellMatrix::new(&condition.matrix, &condition.matrix).middle();
+        Balanced { base, gradient: mean(0), difference: mean(1) }
+    };
+    conditions.iter().zip(pairs).map(of_pair).collect()
 }
 
 impl Condition {

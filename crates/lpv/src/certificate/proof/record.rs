@@ -10,11 +10,11 @@
 
 mod sha256;
 
-use super::closed_loop::{ClosedLoop, Form, Place, Row};
+use super::closed_loop::{ByRows, ClosedLoop, Form, Place, Row};
+use super::decrease::{DecreaseProof, Found};
 use super::matrix::CellMatrix;
 use super::polytopic::{PolytopicClaim, PolytopicLyapunov};
-use super::rowwise::{Claimed, RowWise};
-use super::{Attempt, Cells, LEAST_HALF, Proofs, Unprovable, decrease, sampled_constant};
+use super::{Attempt, Cells, LEAST_HALF, Proofs, Unprovable, sampled_constant};
 use crate::certificate::{Claim, ClaimKind, Motion, Of, SupervisedProofs, Verdict};
 use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
@@ -350,29 +350,30 @@ fn unsaturated(closed_loop: &ClosedLoop, level: f64) -> Result<Vec<Value>, Recor
 /// Of the decrease, or with a factor of the cost. The variant is "rows" where the saturation is taken row by row, each cell with α/κ of
 /// the inputs that may saturate; else the list of those that fly K, the others flying F.
 fn falling(closed_loop: &ClosedLoop, rate: f64, factor: Option<f64>) -> Result<Vec<Value>, RecordError> {
-    let claimed = Claimed { factor: factor.unwrap_or(1.0), cost: if factor.is_some() { 1.0 } else { 0.0 } };
+    let weights = [factor.unwrap_or(1.0), if factor.is_some() { 1.0 } else { 0.0 }];
+    let mut proof = DecreaseProof::new(closed_loop);
+    found(&proof.at(rate, weights), "V decreases")?;
     let saturating = closed_loop.saturating();
-    if !saturating.is_empty() {
-        let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| closed_loop.row_wise(place, claimed));
-        if matches!(decrease(&mut cells, LEAST_HALF, rate, claimed), Attempt::Proved(_)) {
-            let weights = |cell: &RowWise, value: &mut Vec<Value>| {
-                // of a row that takes nothing any number will do
-                let of = |&alpha: &f64| if alpha == 0.0 { 1.0 } else { alpha / claimed.factor };
-                value.push(json!(cell.alpha.iter().map(of).collect::<Vec<f64>>()));
+    match proof.found() {
+        Found::ByRows(cells) => {
+            let multipliers = |cell: &ByRows, value: &mut Vec<Value>| {
+                value.push(json!(cell.multipliers.iter().map(|c| c / weights[0]).collect::<Vec<f64>>()));
             };
-            return Ok(groups(&cells, |_| json!("rows"), weights));
+            Ok(groups(cells, |_| json!("rows"), multipliers))
+        }
+        Found::ByMixtures(cells) => {
+            let flying = |place: &Place| match saturating.is_empty() {
+                true => Value::Null,
+                false => json!(
+                    (0..saturating.len())
+                        .filter(|i| place.variant >> i & 1 == 1)
+                        .map(|i| saturating[i])
+                        .collect::<Vec<_>>()
+                ),
+            };
+            Ok(groups(cells.ok_or(RecordError::NotFound("V decreases"))?, flying, |_, _| ()))
         }
     }
-    let mixtures = closed_loop.mixtures().ok_or(RecordError::NotFound("V decreases"))?;
-    let mut cells = Cells::new(closed_loop.pieces, mixtures, |place| closed_loop.decrease(place));
-    found(&decrease(&mut cells, LEAST_HALF, rate, claimed), "V decreases")?;
-    let flying = |place: &Place| match saturating.is_empty() {
-        true => Value::Null,
-        false => json!(
-            (0..saturating.len()).filter(|i| place.variant >> i & 1 == 1).map(|i| saturating[i]).collect::<Vec<_>>()
-        ),
-    };
-    Ok(groups(&cells, flying, |_, _| ()))
 }
 
 /// Each with its X.

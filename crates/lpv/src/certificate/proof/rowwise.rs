@@ -1,203 +1,216 @@
-//! A saturated input at a time: one inequality instead of 2^m mixtures of rows.
+//! The decrease of V under saturation, row by row: one inequality in place of one for each of the 2^m mixtures of rows of K and F.
 //!
-//! On {V ≤ γ} the input sᵢ of a high gain lies between fᵢx and kᵢx. In the decrease that is claimed, κV̇ + c(xᵀQx + sᵀRs) < 0 with V̇ =
-//! 2xᵀP(Ax − Bs), it stands for diagonal R in the terms −2κ(bᵢᵀPx)sᵢ + c rᵢsᵢ² alone. They are convex in sᵢ, so that their largest
-//! value between fᵢx and kᵢx is at an end:
+//! On {V ≤ γ} a saturated input sᵢ lies between fᵢx and kᵢx, because fᵢx is unsaturated there. To be shown is, for every such s,
 //!
 //! ```text
-//! value at fᵢx + max(0, (dᵢx)(gᵢx)),    dᵢ = kᵢ − fᵢ,    gᵢ = c rᵢ(kᵢ + fᵢ) − 2κ bᵢᵀP.
+//! −κ 2xᵀP(Ax − Bs) − c (xᵀQx + sᵀRs) > 0.
 //! ```
 //!
-//! For any αᵢ > 0 and δᵢ = gᵢ + αᵢdᵢ, (dᵢx)(gᵢx) = (dᵢx)(δᵢx) − αᵢ(dᵢx)² ≤ (δᵢx)²/(4αᵢ). With M_F, the matrix of the decrease with F,
+//! If R couples no two inputs that may saturate, this is a sum of functions hᵢ(sᵢ) = 2κ(bᵢᵀPx) sᵢ − c sᵢ (rᵢsᵢ + 2 Σⱼ Rᵢⱼkⱼx), j over the
+//! inputs that cannot, and of what does not see s. Each hᵢ is concave (rᵢ ≥ 0), its least value on the interval is at an end, and
+//! with dᵢ = kᵢ − fᵢ
 //!
 //! ```text
-//! M_F − Σᵢ δᵢᵀδᵢ/(4αᵢ) ≻ 0
+//! hᵢ(fᵢx) − hᵢ(kᵢx) = (dᵢx)(gᵢx),    gᵢ = c (R(K + F))ᵢ − 2κ bᵢᵀP,
 //! ```
 //!
-//! proves the decrease for every saturation, whatever the number of inputs. Nothing is lost where δᵢ = 0: that is so for K = F + s(R⁻¹BᵀP − F), 0 < s < 2,
-//! and αᵢ = κrᵢ(2 − cs/κ)/s, which is what synthesis makes, up to the schedule between grid points. αᵢ is a number that is chosen in the middle of a
-//! cell, ‖gᵢ‖/‖dᵢ‖ in the norm of M_F⁻¹, where ‖δᵢ‖²/αᵢ is least; the proof does not ask where it is from. Of an R that is not diagonal
-//! its row sums of absolute values are taken, sᵀRs ≤ Σᵢ(Σⱼ|Rᵢⱼ|)sᵢ². In the inverse form every row is one times Y.
+//! where F has the rows of K for the inputs that cannot saturate. So with M_F, the matrix of the claim for S = F, the left side is at least
+//! xᵀM_F x − Σ max(0, (dᵢx)(gᵢx)). For any number cᵢ > 0 and δᵢ = gᵢ + cᵢdᵢ
+//!
+//! ```text
+//! (dᵢx)(gᵢx) = (dᵢx)(δᵢx) − cᵢ(dᵢx)² ≤ (δᵢx)²/(4cᵢ),
+//! ```
+//!
+//! and **M_F − Σ δᵢᵀδᵢ/(4cᵢ) ≻ 0 proves every mixture**. To start from S = K, or from any mixture, gives the same matrix, as
+//! M_F − Σ δᵢᵀδᵢ/(4cᵢ) = ½(M_F + M_K) − ¼ Σ (gᵢᵀgᵢ/cᵢ + cᵢdᵢᵀdᵢ), and no smaller quadratic form than (δᵢx)²/(4cᵢ) for some cᵢ bounds
+//! max(0, (dᵢx)(gᵢx)). Nothing is lost (δ = 0) where K = F + s(R⁻¹BᵀP − F), 0 < s < 2, κ = c = 1: gᵢ = −rᵢ(2 − s)(R⁻¹BᵀP − F)ᵢ is then
+//! a negative multiple of dᵢ, and cᵢ = rᵢ(2 − s)/s. That is the gain of `synthesis/high_gain.rs`.
+//!
+//! With V = xᵀY⁻¹x and x = Yz everything is multiplied by Y: the rows are those of FY, KY, and bᵢᵀ is in the place of bᵢᵀP.
+//!
+//! An R that couples inputs that may saturate is replaced by a larger one that does not ([`separable`]), which loses something.
 
-use super::closed_loop::{ClosedLoop, Decrease, Form, Place};
-use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::matrix::TaylorMatrix;
 use crate::math::Mat;
+use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::interval::Interval;
-use crate::math::matrix::{diagonal, quadratic_form};
+use crate::math::matrix::{cholesky_inverse, diagonal, identity, inverse_spd, quadratic_form};
 use crate::math::taylor::Taylor;
 
-/// Inputs that may saturate up to which 2^m mixtures are enumerated where the row-wise inequality is not proved.
-pub(super) const MOST_ENUMERATED: usize = 10;
-/// Of the decrease, what a row without gᵢ may take at most.
-const LEAST_SHARE: f64 = 1e-9;
+/// Inputs that may saturate up to which all mixtures of rows are tried where the condition by rows does not prove.
+const MOST_ENUMERATED: usize = 10;
+/// The number of a mixture: all rows of K, however many there are.
+pub(super) const ALL_HIGH: usize = usize::MAX;
+/// Share of the decrease that one row may take without harm, where it has to take some.
+const HARMLESS: f64 = 1e-9;
+/// Share of the decrease that all rows may take before their multipliers are looked for again, and how often they are.
+const CONTENT: f64 = 0.5;
+const ROUNDS: usize = 8;
+/// How far the decrease that multipliers are balanced against stays from the edge.
+const INSIDE: f64 = 1.05;
 
-/// The decrease κ V̇ + c (xᵀQx + uᵀRu) < 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Claimed {
-    /// κ
-    pub factor: f64,
-    /// c
-    pub cost: f64,
+/// Number of mixtures of rows where `saturating` inputs may saturate; `None` where there are too many to enumerate.
+pub(super) fn mixtures(saturating: usize) -> Option<usize> {
+    (saturating <= MOST_ENUMERATED).then(|| 1 << saturating)
 }
 
-/// What is definite on a cell if the decrease holds there.
-pub(super) trait Decreasing: Send + Sync {
-    /// Whether κ(constant + ρ̇ rate) + c cost, less what the saturation takes, is positive definite for |t − c| ≤ `half`.
-    fn is_decreasing(&self, rate: f64, claimed: Claimed, half: f64) -> Definiteness;
+/// Rows of `high` where the bit of `mixture` is set and of `low` elsewhere; of `high` for inputs that are not among `saturating`.
+/// Mixture 0 is all of `low`.
+pub(super) fn mixed(mixture: usize, saturating: &[usize], low: &TaylorMatrix, high: &TaylorMatrix) -> TaylorMatrix {
+    let (m, n) = high.shape();
+    let is_set = |bit: usize| mixture == ALL_HIGH || mixture.checked_shr(bit as u32).unwrap_or(0) & 1 == 1;
+    let mut is_low = vec![false; m];
+    saturating.iter().enumerate().for_each(|(bit, &i)| is_low[i] = !is_set(bit));
+    TaylorMatrix::from_fn(m, n, |i, j| if is_low[i] { low.at(i, j) } else { high.at(i, j) })
 }
 
-impl Decreasing for Decrease {
-    fn is_decreasing(&self, rate: f64, Claimed { factor, cost }: Claimed, half: f64) -> Definiteness {
-        let terms = [(factor, &self.constant), (factor * rate, &self.rate), (cost, &self.cost)];
-        CellMatrix::combination(&terms).is_positive(half)
-    }
-}
-
-/// The decrease with F, and what the saturation takes from it.
-pub(super) struct RowWise {
-    decrease: Decrease,
-    /// Σ δᵢᵀδᵢ/(4αᵢ)
-    taken: CellMatrix,
-    /// αᵢ of the inputs that may saturate; empty where there are none to be had.
-    pub alpha: Vec<f64>,
-}
-
-impl Decreasing for RowWise {
-    fn is_decreasing(&self, rate: f64, Claimed { factor, cost }: Claimed, half: f64) -> Definiteness {
-        let Decrease { constant, rate: by_rate, cost: stage } = &self.decrease;
-        let terms = [(factor, constant), (factor * rate, by_rate), (cost, stage), (-1.0, &self.taken)];
-        match CellMatrix::combination(&terms).is_positive(half) {
-            // that this bound is not definite refutes nothing
-            Definiteness::Refuted { .. } => Definiteness::Open { fits: 0.0 },
-            other => other,
+/// R̂ ⪰ R that couples no two of the inputs `saturating`; R itself if that does not.
+///
+/// 2sᵢsⱼ ≤ τsᵢ² + sⱼ²/τ for any τ > 0, here √(rᵢ/rⱼ): each |Rᵢⱼ| goes to the diagonal, weighted. R̂ − R is then a sum of positive
+/// semidefinite matrices of two rows; sums are rounded up.
+pub(super) fn separable(r: &Mat<f64>, saturating: &[usize]) -> Mat<f64> {
+    let mut bound = r.clone();
+    for (at, &i) in saturating.iter().enumerate() {
+        for &j in &saturating[at + 1..] {
+            let coupling = r[(i, j)].abs().max(r[(j, i)].abs());
+            (bound[(i, j)], bound[(j, i)]) = (0.0, 0.0);
+            if coupling != 0.0 {
+                let tau = positive((r[(i, i)] / r[(j, j)]).sqrt());
+                let raised = |entry: f64, by: Interval| (Interval::point(entry) + by).hi();
+                bound[(i, i)] = raised(bound[(i, i)], Interval::point(coupling) * tau);
+                bound[(j, j)] = raised(bound[(j, j)], Interval::point(coupling) / tau);
+            }
         }
     }
+    bound
 }
 
-/// R where it is diagonal, else its row sums of absolute values, rounded up.
-pub(super) fn separable(r: &Mat<f64>) -> Mat<f64> {
-    let row = |i: usize| {
-        let others = (0..r.ncols()).filter(|&j| j != i && r[(i, j)] != 0.0);
-        others.fold(Interval::point(r[(i, i)].abs()), |sum, j| sum + r[(i, j)].abs()).hi()
-    };
-    diagonal(&(0..r.nrows()).map(row).collect::<Vec<f64>>())
-}
-
-/// The αᵢ for rows dᵢ and gᵢ as numbers, against the decrease with this inverse; `None` where a row takes nothing.
-pub(super) fn balance(d: &[f64], g: &[f64], inverse: &Mat<f64>) -> Option<f64> {
-    let size = |row: &[f64]| quadratic_form(inverse, row).max(0.0).sqrt();
-    let (d, g) = (size(d), size(g));
-    let alpha = (g / d).max(LEAST_SHARE / (d * d));
-    (d > 0.0 && alpha.is_finite()).then_some(alpha)
-}
-
-/// 1/(4α), not less.
-pub(super) fn share(alpha: f64) -> f64 {
-    (0.25 / alpha).next_up()
-}
-
-/// Rows dᵢ and gᵢ of the inputs that may saturate.
+/// gᵢ and dᵢ of the inputs that may saturate, as the rows of two matrices.
 pub(super) struct Rows {
-    pub d: TaylorMatrix,
-    pub g: TaylorMatrix,
+    pub gradient: TaylorMatrix,
+    pub difference: TaylorMatrix,
 }
 
 impl Rows {
-    /// From kᵢ, fᵢ (or those times Y), bᵢᵀP (or bᵢᵀ) and rᵢ of the inputs `saturating`.
+    /// From BᵀP (or Bᵀ), the gains (or their products with Y), R̂ and the weights κ and c.
     pub fn new(
         saturating: &[usize],
-        [k, f, bp]: [&TaylorMatrix; 3],
+        input: &TaylorMatrix,
+        [low, high]: [&TaylorMatrix; 2],
         r: &Mat<f64>,
-        Claimed { factor, cost }: Claimed,
+        [factor, cost]: [f64; 2],
     ) -> Self {
-        let n = k.shape().1;
-        let rows = |of: &dyn Fn(usize, usize) -> Taylor| {
-            TaylorMatrix::from_fn(saturating.len(), n, |at, j| of(saturating[at], j))
+        let n = high.shape().1;
+        let rows =
+            |matrix: &TaylorMatrix| TaylorMatrix::from_fn(saturating.len(), n, |i, j| matrix.at(saturating[i], j));
+        let flow = |i: usize, j: usize| -input.at(saturating[i], j) * (2.0 * factor);
+        let gradient = if cost == 0.0 {
+            TaylorMatrix::from_fn(saturating.len(), n, flow)
+        } else {
+            let of_saturating = Mat::from_fn(saturating.len(), r.ncols(), |i, j| r[(saturating[i], j)]);
+            let stage = TaylorMatrix::constant(&of_saturating).times(&low.plus(high));
+            TaylorMatrix::from_fn(saturating.len(), n, |i, j| stage.at(i, j) * cost + flow(i, j))
         };
-        Self {
-            d: rows(&|i, j| k.at(i, j) - f.at(i, j)),
-            g: rows(&|i, j| {
-                let by_cost = (k.at(i, j) + f.at(i, j)) * Taylor::constant(Interval::point(cost) * r[(i, i)]);
-                by_cost - bp.at(i, j) * Taylor::constant(Interval::point(factor) * 2.0)
-            }),
-        }
+        Self { gradient, difference: rows(high).minus(&rows(low)) }
     }
 
-    /// αᵢ of each row, chosen by the middles of the entries; zero of one that takes nothing.
-    pub fn balance(&self, inverse: &Mat<f64>) -> Vec<f64> {
-        let (rows, n) = self.d.shape();
-        let middle =
-            |matrix: &TaylorMatrix, i: usize| -> Vec<f64> { (0..n).map(|j| matrix.at(i, j).value.middle()).collect() };
-        (0..rows).map(|i| balance(&middle(&self.d, i), &middle(&self.g, i), inverse).unwrap_or(0.0)).collect()
+    /// The inputs with dᵢ ≠ 0 somewhere, for rows over a whole cell: of the others nothing is taken, whatever g is.
+    pub fn moving(&self) -> Vec<bool> {
+        let (count, n) = self.difference.shape();
+        (0..count).map(|i| (0..n).any(|j| !self.difference.at(i, j).is_zero())).collect()
     }
 
-    /// δᵢ
-    pub fn slack(&self, alpha: &[f64]) -> TaylorMatrix {
-        let (rows, n) = self.d.shape();
-        TaylorMatrix::from_fn(rows, n, |i, j| match alpha[i] {
-            0.0 => Taylor::from(0.0),
-            alpha => self.g.at(i, j) + self.d.at(i, j) * alpha,
+    /// δᵢ = gᵢ + cᵢdᵢ of the inputs that are `moving`, else zero.
+    pub fn deltas(&self, multipliers: &[f64], moving: &[bool]) -> TaylorMatrix {
+        let (count, n) = self.gradient.shape();
+        TaylorMatrix::from_fn(count, n, |i, j| match moving[i] {
+            true => self.gradient.at(i, j) + self.difference.at(i, j) * multipliers[i],
+            false => Taylor::from(0.0),
         })
     }
 
-    /// Whether a row with dᵢ ≠ 0 somewhere has no αᵢ.
-    fn is_left_out(&self, alpha: &[f64]) -> bool {
-        let (rows, n) = self.d.shape();
-        (0..rows).any(|i| alpha[i] == 0.0 && (0..n).any(|j| !self.d.at(i, j).is_zero()))
+    /// The values in the middle, as numbers.
+    pub fn middle(&self) -> [Mat<f64>; 2] {
+        [&self.gradient, &self.difference].map(super::witness::middle)
     }
 }
 
-/// diag(1/(4αᵢ))
-pub(super) fn shares(alpha: &[f64]) -> Mat<f64> {
-    diagonal(&alpha.iter().map(|&alpha| if alpha == 0.0 { 0.0 } else { share(alpha) }).collect::<Vec<f64>>())
+/// The matrix with 1/(4cᵢ) on its diagonal, rounded up: more than that proves too.
+pub(super) fn shares(multipliers: &[f64]) -> Mat<f64> {
+    diagonal(&multipliers.iter().map(|c| (0.25 / c).next_up()).collect::<Vec<f64>>())
 }
 
-impl ClosedLoop<'_> {
-    /// The row-wise inequality on a cell.
-    pub fn row_wise(&self, place: &Place, claimed: Claimed) -> RowWise {
-        let r = separable(&self.weights.r);
-        let saturating = self.saturating();
-        let at = |t: Taylor| {
-            let parts = self.parts_weighted(place.piece, 0, t, &r);
-            let rows = self.rows(place.piece, t, &parts.gain, &parts.lyapunov, &r, claimed, &saturating);
-            (parts, rows)
-        };
-        let Place { middle, half, .. } = *place;
-        let (over, over_rows) = at(Taylor::variable(Interval::new(middle - half, middle + half)));
-        let (middle, middle_rows) = at(Taylor::variable_of_first_order(Interval::point(middle)));
-        let decrease = Decrease::new(&over, &middle);
-        let nothing = || (CellMatrix::unbounded(self.weights.q.nrows()), Vec::new());
-        let with_f = [(claimed.factor, &decrease.constant), (claimed.cost, &decrease.cost)];
-        let (taken, alpha) = match CellMatrix::combination(&with_f).middle_inverse() {
-            None => nothing(),
-            Some(inverse) => {
-                let alpha = middle_rows.balance(&inverse);
-                let taken = |rows: &Rows| rows.slack(&alpha).quadratic(&shares(&alpha));
-                match over_rows.is_left_out(&alpha) {
-                    true => nothing(),
-                    false => (CellMatrix::new(&taken(&middle_rows), &taken(&over_rows)), alpha),
-                }
-            }
-        };
-        RowWise { decrease, taken, alpha }
-    }
+/// A matrix M_F with the rows gᵢ and dᵢ that take from it, as numbers.
+pub(super) struct Balanced {
+    pub base: Mat<f64>,
+    pub gradient: Mat<f64>,
+    pub difference: Mat<f64>,
+}
 
-    #[allow(clippy::too_many_arguments)] // one line of the derivation
-    fn rows(
-        &self,
-        piece: usize,
-        t: Taylor,
-        f: &TaylorMatrix,
-        lyapunov: &TaylorMatrix,
-        r: &Mat<f64>,
-        claimed: Claimed,
-        saturating: &[usize],
-    ) -> Rows {
-        let (_, b, k) = self.model_and_gain(piece, t);
-        let (k, bp) = match self.form {
-            Form::Direct(_) => (k, b.transpose().times(lyapunov)),
-            Form::Inverse(_) => (k.times(lyapunov), b.transpose()),
+/// Multipliers cᵢ > 0, the same for all of `matrices`, with which what the rows take is small against what is there. Any would prove.
+///
+/// Σ δᵢ W δᵢᵀ/(4cᵢ) with W = M_F⁻¹ is least for cᵢ = ‖gᵢ‖/‖dᵢ‖ in the norm of W. Where that takes too much, W = (θM_F − Σ δᵢᵀδᵢ/(4cᵢ))⁻¹ is
+/// the norm of the next round, with θ ≥ 1 so that it is one: a fixed point has the largest determinant of θM_F − Σ δᵢᵀδᵢ/(4cᵢ).
+pub(super) fn multipliers(matrices: &[Balanced]) -> Vec<f64> {
+    let n = matrices.first().map_or(0, |matrix| matrix.base.nrows());
+    let or_unit = |inverse: Option<Mat<f64>>| inverse.unwrap_or_else(|| identity(n));
+    let mut norms: Vec<Mat<f64>> = matrices.iter().map(|matrix| or_unit(inverse_spd(&matrix.base))).collect();
+    let mut best = (f64::INFINITY, ratios(matrices, &norms));
+    let Some(factors) = matrices.iter().map(|matrix| cholesky_inverse(&matrix.base)).collect::<Option<Vec<_>>>() else {
+        return best.1;
+    };
+    for _ in 0..ROUNDS {
+        let found = ratios(matrices, &norms);
+        let lost: Vec<Mat<f64>> = matrices.iter().map(|matrix| matrix.lost(&found)).collect();
+        let taken = |(factor, lost): (&Mat<f64>, &Mat<f64>)| {
+            symmetric_eigenvalues(&(factor * lost * factor.transpose())).last().copied().unwrap_or(f64::NAN)
         };
-        Rows::new(saturating, [&k, f, &bp], r, claimed)
+        let share = factors.iter().zip(&lost).map(taken).fold(0.0, f64::max);
+        if share < best.0 {
+            best = (share, found);
+        }
+        if share < CONTENT || !share.is_finite() {
+            break;
+        }
+        let left = |(matrix, lost): (&Balanced, &Mat<f64>)| (INSIDE * share).max(1.0) * &matrix.base - lost;
+        norms = matrices.iter().zip(&lost).map(left).map(|left| or_unit(inverse_spd(&left))).collect();
+    }
+    best.1
+}
+
+/// cᵢ = ‖gᵢ‖/‖dᵢ‖, in the root mean square over the matrices, each in its norm.
+fn ratios(matrices: &[Balanced], norms: &[Mat<f64>]) -> Vec<f64> {
+    let count = matrices.first().map_or(0, |matrix| matrix.gradient.nrows());
+    let size = |of: fn(&Balanced) -> &Mat<f64>, i: usize| {
+        let square = |(matrix, norm): (&Balanced, &Mat<f64>)| {
+            let row: Vec<f64> = (0..norm.nrows()).map(|j| of(matrix)[(i, j)]).collect();
+            quadratic_form(norm, &row).max(0.0)
+        };
+        matrices.iter().zip(norms).map(square).sum::<f64>()
+    };
+    let of_input = |i: usize| match (size(|m| &m.gradient, i), size(|m| &m.difference, i)) {
+        (0.0, difference) => 4.0 * HARMLESS / difference,
+        (gradient, 0.0) => gradient / (4.0 * HARMLESS),
+        (gradient, difference) => (gradient / difference).sqrt(),
+    };
+    (0..count).map(of_input).map(positive).collect()
+}
+
+/// `x` if it is an ordinary positive number whose inverse is one too, else 1.
+fn positive(x: f64) -> f64 {
+    let is_ordinary = |x: f64| x.is_normal() && x > 0.0;
+    if is_ordinary(x) && is_ordinary(0.25 / x) { x } else { 1.0 }
+}
+
+impl Balanced {
+    /// Σ δᵢᵀδᵢ/(4cᵢ)
+    fn lost(&self, multipliers: &[f64]) -> Mat<f64> {
+        let (count, n) = (self.gradient.nrows(), self.gradient.ncols());
+        // (δᵢ/(2√cᵢ))
+        let rows = Mat::from_fn(count, n, |i, j| {
+            let c = multipliers[i];
+            (self.gradient[(i, j)] + c * self.difference[(i, j)]) / (2.0 * c.sqrt())
+        });
+        rows.transpose() * &rows
     }
 }

@@ -26,8 +26,9 @@
 //!
 //! None of this depends on the level: it is the one up to which F does not saturate.
 
-use super::closed_loop::{ALL_HIGH, ClosedLoop, Form, Place};
+use super::closed_loop::{ClosedLoop, Form, Place};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::rowwise::ALL_HIGH;
 use super::sampled::{hold, rest};
 use super::{Attempt, Cells, LEAST_HALF};
 use crate::certificate::claim::{Claim, ClaimKind, Verdict, Words};

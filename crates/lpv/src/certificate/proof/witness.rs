@@ -231,7 +231,7 @@ impl ClosedLoop<'_> {
     pub fn leaves(&self, attempt: &Attempt, level: Option<f64>) -> Option<Witness> {
         let Attempt::Refuted { place, rate, direction, value } = attempt else { return None };
         let limited: Vec<usize> = (0..self.inputs()).filter(|&i| self.sigma[i].is_finite()).collect();
-        if Some(place.variant + 1) != self.mixtures() || limited.iter().any(|&i| self.sigma[i] <= 0.0) {
+        if !self.is_all_of_k(place.variant) || limited.iter().any(|&i| self.sigma[i] <= 0.0) {
             return None;
         }
         let parts = self.parts(place.piece, place.variant, at_middle(place));
