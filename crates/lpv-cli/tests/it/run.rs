@@ -356,7 +356,7 @@ fn a_governed_flight_is_certified_and_recorded() {
     }
     let claims = moving["design_claims"].as_array().unwrap();
     let proved = claims.iter().filter(|claim| claim["verdict"] == "proved").count();
-    assert_eq!(proved, 13, "six of each member, one of the motions");
+    assert_eq!(proved, 15, "seven of each member, one of the motions");
     assert_eq!(record["controllers"][1]["outcome"]["kind"], "diverged");
 
     let (header, rows) = rows(&place.read("out/quadrotor-governed/trajectory-moving.csv"));

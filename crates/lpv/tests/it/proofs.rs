@@ -159,7 +159,7 @@ fn the_sampled_loop_is_proved_up_to_its_edge() {
         let spec = PlantSpec::Linear(LinearParameters { a: vec![vec![a]], b: vec![vec![1.0]], c: None });
         let plant = spec.build().unwrap();
         for (sample_time_s, expected) in
-            [(edge * (1.0 - 1e-6), Verdict::Proved), (edge * (1.0 + 1e-6), Verdict::Undecided)]
+            [(edge * (1.0 - 1e-6), Verdict::Proved), (edge * (1.0 + 1e-6), Verdict::Refuted)]
         {
             let request = DesignRequest {
                 name: "sampled".into(),
