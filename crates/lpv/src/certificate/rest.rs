@@ -41,7 +41,8 @@ pub fn unrest(plant: &dyn Plant, reference: &[f64], input: &[f64]) -> Option<Unr
         of(&a, reference, n) + of(&b, input, m)
     };
     let flow = plant.dynamics_over(&x, &u);
-    let moves = |i: usize| !(flow[i].value.magnitude() <= ROUNDING * terms(i));
+    // what is not known moves
+    let moves = |i: usize| flow[i].value.magnitude().is_nan() || flow[i].value.magnitude() > ROUNDING * terms(i);
     let fastest =
         (0..n).filter(|&i| moves(i)).max_by(|&i, &j| flow[i].value.magnitude().total_cmp(&flow[j].value.magnitude()));
     if let Some(state) = fastest {
@@ -52,7 +53,8 @@ pub fn unrest(plant: &dyn Plant, reference: &[f64], input: &[f64]) -> Option<Unr
     let (a_there, b_there) = plant.jacobians_over(&points(&operating.state), &points(&operating.input));
     let differs = |here: &[Taylor], there: &[Taylor]| {
         let size = there.iter().map(|entry| entry.value.magnitude()).fold(0.0, f64::max);
-        here.iter().zip(there).any(|(a, b)| !((a.value - b.value).magnitude() <= SAME * size))
+        let is_far = |distance: f64| distance.is_nan() || distance > SAME * size;
+        here.iter().zip(there).any(|(a, b)| is_far((a.value - b.value).magnitude()))
     };
     (differs(&a, &a_there) || differs(&b, &b_there)).then_some(Unrest::Elsewhere)
 }
