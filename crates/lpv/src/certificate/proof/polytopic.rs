@@ -16,7 +16,7 @@
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use super::rowwise::{Balanced, Rows, mixed, mixtures, multipliers, separable, shares};
 use super::weights;
-use super::witness::{Broken, Loop, form, image, inverse};
+use super::witness::{Broken, Loop, form, image, inverse, unsaturated_scale};
 use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Witness, Words, settle};
 use crate::math::Mat;
 use crate::math::decimal::at_least;
@@ -319,7 +319,17 @@ impl<'a> Sums<'a> {
                 return None;
             }
         }
-        let scale = level.map_or(1.0, |level| (level / size.middle()).sqrt());
+        let inputs = image(&self.mean(&self.gain, &condition.weights), direction);
+        // on the edge, or so small that no input is at its limit
+        let scale = match level {
+            Some(level) => (level / size.middle()).sqrt(),
+            None => (inputs.iter().enumerate().filter(|&(i, _)| self.sigma(i).is_finite()))
+                .map(|(i, &input)| unsaturated_scale(self.sigma(i), input))
+                .fold(1.0, f64::min),
+        };
+        if scale.is_nan() || scale <= 0.0 {
+            return None;
+        }
         let state = self.state(&condition.weights, direction).iter().map(|x| scale * x).collect();
         Some(condition.witness(state, value))
     }

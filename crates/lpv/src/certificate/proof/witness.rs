@@ -246,7 +246,12 @@ impl ClosedLoop<'_> {
                 return None;
             }
         }
-        let scale = level.map_or(1.0, |level| (level / size.middle()).sqrt());
+        // on the edge, or so small that no input is at its limit
+        let inputs = image(&parts.gain, direction);
+        let scale = match level {
+            Some(level) => (level / size.middle()).sqrt(),
+            None => limited.iter().map(|&i| unsaturated_scale(self.sigma[i], inputs[i])).fold(1.0, f64::min),
+        };
         let state = self.state(place.middle, direction).iter().map(|x| scale * x).collect();
         Some(Witness {
             parameter: self.parameter(place.middle),
@@ -290,6 +295,11 @@ impl ClosedLoop<'_> {
         let Broken { state, value } = self.at(place)?.exceeds_cost(factor)?;
         Some(Witness { parameter: self.parameter(place.middle), state, value, ..Witness::default() })
     }
+}
+
+/// What a state has to be multiplied with, at most, that the input `input` stays well within σ > 0.
+pub(super) fn unsaturated_scale(sigma: f64, input: Interval) -> f64 {
+    0.5 * (sigma / input.magnitude())
 }
 
 /// The variable in the middle of a place.
