@@ -106,7 +106,9 @@ fn cell(closed_loop: &ClosedLoop, place: &Place, sample_time_s: f64, times: Time
 /// One matrix for all mixtures, or where that is not definite in the middle, one for each.
 fn matrices(middle: &Condition, over: &Condition) -> Vec<CellMatrix> {
     if let Some(factors) = middle.factors() {
-        let [middle, over] = [middle, over].map(|condition| condition.for_all_mixtures(&factors));
+        // for the whole cell or not at all: both forms have to be of one function
+        let moving = over.moving();
+        let [middle, over] = [middle, over].map(|condition| condition.for_all_mixtures(&factors, &moving));
         let one = CellMatrix::new(&middle, &over);
         if matches!(one.is_positive(0.0), Definiteness::Proved(_)) || factors.len() > MOST_MIXED {
             return vec![one];
@@ -214,13 +216,16 @@ impl Condition {
         changes.iter().map(factor).collect()
     }
 
-    /// M(φ, F) − Σδᵢδᵢᵀ/(4cᵢ), without the inputs whose rows of F and K agree exactly.
-    fn for_all_mixtures(&self, factors: &[f64]) -> TaylorMatrix {
+    /// The inputs whose rows of F and K differ somewhere, for a condition over a whole cell.
+    fn moving(&self) -> Vec<bool> {
+        self.changes.iter().map(|[u, _]| !u.iter().all(Taylor::is_zero)).collect()
+    }
+
+    /// M(φ, F) − Σδᵢδᵢᵀ/(4cᵢ) of the inputs that are `moving`.
+    fn for_all_mixtures(&self, factors: &[f64], moving: &[bool]) -> TaylorMatrix {
         let size = self.matrix.shape().0;
-        self.changes.iter().zip(factors).fold(self.matrix.clone(), |sum, ([u, w], &c)| {
-            if u.iter().all(Taylor::is_zero) {
-                return sum;
-            }
+        let changes = self.changes.iter().zip(factors).zip(moving).filter(|(_, moving)| **moving);
+        changes.fold(self.matrix.clone(), |sum, (([u, w], &c), _)| {
             let delta = TaylorMatrix::from_fn(1, size, |_, j| u[j] * c - w[j] * 2.0);
             sum.minus(&delta.transpose().times(&delta).scaled(0.25 / c))
         })
