@@ -89,6 +89,13 @@ fn a_bad_auxiliary_matrix_refutes_nothing() {
     assert_eq!((code, verdict(&claims, "decrease"), verdict(&claims, "cost")), (4, "refuted", "undecided"));
 }
 
+/// V̇ = −2x₂² ≤ 0: the set is invariant, which no strict inequality shows; that the cost is more than V refutes the cost alone.
+#[test]
+fn an_undecided_decrease_is_not_refuted_by_the_cost() {
+    let (code, claims, _) = certified("undecided_decrease.json", "");
+    assert_eq!((code, verdict(&claims, "invariance")), (4, "undecided"), "{claims:?}");
+}
+
 #[test]
 fn bounds_are_printed_to_the_safe_side() {
     let text = place("design-rate-s1.json").lpv("certify design-rate-s1.json --rate 5.34836").out;

@@ -461,10 +461,10 @@ fn at_witness(witness: &Witness) -> String {
 fn witness_words(kind: &ClaimKind) -> &'static str {
     match kind {
         ClaimKind::LyapunovDefinite => "V is not positive at the state of the witness",
-        ClaimKind::Unsaturated { .. } => "a limit is passed at the state of the witness, inside the set",
+        ClaimKind::Unsaturated { .. } => "a limit is passed at a multiple of the state of the witness, inside the set",
         ClaimKind::Decrease { .. } => "V grows from the state of the witness",
         ClaimKind::Invariance { .. } => "the motion from the state of the witness leaves the set",
-        ClaimKind::Cost { .. } => "the motion from the state of the witness costs more",
+        ClaimKind::Cost { .. } => "the motion from a small multiple of the state of the witness costs more",
         ClaimKind::FrozenStability | ClaimKind::SampledStability { .. } => {
             "the motion from the state of the witness does not come to rest"
         }

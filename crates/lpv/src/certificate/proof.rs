@@ -331,7 +331,8 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         };
         let witness = match (&attempt, place) {
             (Attempt::Refuted { .. }, 0) => closed_loop.leaves(&attempt, level),
-            (Attempt::Refuted { place, .. } | Attempt::Open { place, .. }, _) => closed_loop.costs_more(place, factor),
+            // only a claim about the cost is refuted by a cost
+            (Attempt::Refuted { place, .. } | Attempt::Open { place, .. }, 1) => closed_loop.costs_more(place, factor),
             _ => None,
         };
         let mut claim = words.claim(kind, attempt, &closed_loop, decrease.cells(), started).resting_on(premises);

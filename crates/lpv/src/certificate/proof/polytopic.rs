@@ -322,7 +322,7 @@ impl<'a> Sums<'a> {
         let inputs = image(&self.mean(&self.gain, &condition.weights), direction);
         // on the edge, or so small that no input is at its limit
         let scale = match level {
-            Some(level) => (level / size.middle()).sqrt(),
+            Some(level) => level.sqrt() / size.middle().sqrt(),
             None => (inputs.iter().enumerate().filter(|&(i, _)| self.sigma(i).is_finite()))
                 .map(|(i, &input)| unsaturated_scale(self.sigma(i), input))
                 .fold(1.0, f64::min),
@@ -336,7 +336,9 @@ impl<'a> Sums<'a> {
 
     /// The witness that a motion at rest at these weights costs more than `factor` V(x(0)).
     fn costs_more(&self, condition: &Condition, factor: f64, weights: &CostWeights) -> Option<Witness> {
-        if !self.allows_rest() {
+        // an input without room saturates however small the state is
+        let has_room = (0..self.claim.polytope.inputs()).all(|i| self.sigma(i) > 0.0);
+        if !self.allows_rest() || !has_room {
             return None;
         }
         let (polytope, at) = (&self.claim.polytope, &condition.weights);

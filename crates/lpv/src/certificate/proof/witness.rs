@@ -249,7 +249,7 @@ impl ClosedLoop<'_> {
         // on the edge, or so small that no input is at its limit
         let inputs = image(&parts.gain, direction);
         let scale = match level {
-            Some(level) => (level / size.middle()).sqrt(),
+            Some(level) => level.sqrt() / size.middle().sqrt(),
             None => limited.iter().map(|&i| unsaturated_scale(self.sigma[i], inputs[i])).fold(1.0, f64::min),
         };
         let state = self.state(place.middle, direction).iter().map(|x| scale * x).collect();
