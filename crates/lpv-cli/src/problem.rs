@@ -12,7 +12,7 @@ use file::{DesignTable, LyapunovName, Matrices, MethodName, ModelTable, Objectiv
 use lpv::math::Mat;
 use lpv::math::matrix::{from_rows, inverse_spd, is_symmetric};
 use lpv::model::{FrozenModel, GridModel, Polytope, linearize};
-use lpv::synthesis::polytopic::{HighGain, InputBounds, Lyapunov, Objective, rate_box_vertices};
+use lpv::synthesis::polytopic::{BackOff, HighGain, InputBounds, Lyapunov, Objective, rate_box_vertices};
 use lpv::synthesis::{CostWeights, HighGainOptions};
 pub use solve::solve;
 use std::path::Path;
@@ -46,6 +46,8 @@ pub struct ProblemPlan {
     pub high_gain: Option<HighGain>,
     /// What is optimised.
     pub objective: Objective,
+    /// How much of the optimum is given back for a gain that can be applied.
+    pub back_off: BackOff,
     /// The objective is the reach along its states.
     pub region: bool,
     /// State whose cost is bounded, with the model (for frozen designs) or the weights of its parameter.
@@ -130,6 +132,7 @@ impl ProblemPlan {
             saturation,
             high_gain,
             objective,
+            back_off: back_off(&door, design.back_off)?,
             region,
             initial,
         };
@@ -398,6 +401,19 @@ fn high_gain(door: &Door, design: &DesignTable, m: usize) -> Result<Option<HighG
         None => None,
     };
     Ok(Some(HighGain { options: HighGainOptions { recovery, gain_margin }, sample_time_s }))
+}
+
+/// The share of the optimum that is given back: the knee where the file does not say, nothing for 0.
+fn back_off(door: &Door, share: Option<f64>) -> Result<BackOff, Failure> {
+    match share {
+        None => Ok(BackOff::Knee),
+        Some(0.0) => Ok(BackOff::Nothing),
+        Some(share) if (1e-6..=0.9).contains(&share) => Ok(BackOff::Share(share)),
+        Some(share) => {
+            let message = "a share of the optimum: 0 for the bare optimum, or 1e-6 to 0.9";
+            door.refuse("design.back_off", format!("is {share}: it has to be {message}"))
+        }
+    }
 }
 
 fn objective(door: &Door, design: &DesignTable, n: usize, saturated: bool) -> Result<(Objective, bool), Failure> {

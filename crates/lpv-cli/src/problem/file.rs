@@ -98,6 +98,7 @@ pub struct DesignTable {
     pub sample_time_s: Option<f64>,
     pub recovery: Option<f64>,
     pub gain_margin: Option<f64>,
+    pub back_off: Option<f64>,
     #[serde(default)]
     pub objective: ObjectiveName,
     pub initial_state: Option<Vec<f64>>,

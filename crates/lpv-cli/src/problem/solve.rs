@@ -6,11 +6,12 @@ use lmi::{Explanation, Outcome, Witness};
 use lpv::certificate::Verdict;
 use lpv::math::Mat;
 use lpv::math::decimal::{Rounding, about, at_least, decimal, fixed};
+use lpv::math::eigen::symmetric_eigenvalues;
 use lpv::math::matrix::{quadratic_form, to_rows};
 use lpv::model::{FrozenModel, Polytope};
 use lpv::synthesis::SynthesisError;
 use lpv::synthesis::polytopic::{
-    Lyapunov, PolytopicDesign, PolytopicRequest, Solution, Theorem, UnstabilizablePoint, frozen, synthesize,
+    Lyapunov, Moderation, PolytopicDesign, PolytopicRequest, Solution, Theorem, UnstabilizablePoint, frozen, synthesize,
 };
 use serde::Serialize;
 use serde::ser::SerializeMap;
@@ -31,6 +32,18 @@ pub struct Report {
     objective: Option<f64>,
     /// What `objective` is.
     objective_is: &'static str,
+    /// The objective of the design that is returned, where a part of the optimum was given back.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    achieved: Option<f64>,
+    /// The share of the optimum that was given back for a smaller gain, at most; 0: nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    back_off: Option<f64>,
+    /// Whether the optimum is attained, to the solver's tolerance; of one that is not, `objective` is what the solver came to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    optimum_is_attained: Option<bool>,
+    /// Largest singular value of the Kᵢ.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    largest_gain: Option<f64>,
     /// How the Lyapunov function depends on the parameter.
     lyapunov: &'static str,
     /// What the design was made for: with it `lpv certify` needs no other file.
@@ -137,6 +150,7 @@ pub fn solve(plan: &ProblemPlan, path: &std::path::Path) -> Result<Report, Failu
         saturation: plan.saturation.clone(),
         high_gain: plan.high_gain,
         objective: plan.objective.clone(),
+        back_off: plan.back_off,
     };
     let failed = |error| failure_at(plan, path, error);
     let started = Instant::now();
@@ -229,7 +243,10 @@ fn report(
     });
     let inside = guaranteed.zip(plan.saturation.as_ref()).map(|(bound, saturation)| bound <= saturation.gamma);
     let (verdict, verdict_reason) = verdict(plan, &designs[worst], inside);
-    let (objective, objective_is) = objective(plan, designs);
+    let (objective, objective_is) = objective(plan, designs, &PolytopicDesign::optimum);
+    let moderations: Vec<&Moderation> = designs.iter().filter_map(|design| design.moderation.as_ref()).collect();
+    let gains = solutions.iter().flatten().flat_map(|solution| &solution.gain);
+    let largest_gain = gains.map(largest_singular_value).reduce(f64::max);
     Report {
         status: status(&designs[worst]),
         theorem,
@@ -253,6 +270,14 @@ fn report(
         },
         objective: solutions.as_ref().and(objective),
         objective_is,
+        achieved: solutions
+            .as_ref()
+            .filter(|_| !moderations.is_empty())
+            .and_then(|_| self::objective(plan, designs, &PolytopicDesign::achieved).0),
+        back_off: moderations.iter().map(|moderation| moderation.back_off).reduce(f64::max),
+        optimum_is_attained: (!moderations.is_empty())
+            .then(|| moderations.iter().all(|moderation| moderation.is_attained)),
+        largest_gain,
         places: plan.places.clone(),
         y: matrices(&|solution| solution.y.clone()),
         p: matrices(&|solution| solution.p.clone()),
@@ -280,6 +305,10 @@ fn report(
     }
 }
 
+fn largest_singular_value(k: &Mat<f64>) -> f64 {
+    symmetric_eigenvalues(&(k * k.transpose())).into_iter().fold(0.0, f64::max).sqrt()
+}
+
 fn status(design: &PolytopicDesign) -> &'static str {
     match design.answer.outcome {
         _ if design.is_infeasible() => "infeasible",
@@ -290,8 +319,13 @@ fn status(design: &PolytopicDesign) -> &'static str {
     }
 }
 
-fn objective(plan: &ProblemPlan, designs: &[PolytopicDesign]) -> (Option<f64>, &'static str) {
-    let all = designs.iter().map(|design| design.answer.objective);
+/// The objective of the problem, of the values `of` its designs.
+fn objective(
+    plan: &ProblemPlan,
+    designs: &[PolytopicDesign],
+    of: &dyn Fn(&PolytopicDesign) -> f64,
+) -> (Option<f64>, &'static str) {
+    let all = designs.iter().map(of);
     match (&plan.objective, &plan.saturation) {
         _ if plan.weights.is_none() => {
             (all.reduce(f64::min), "largest margin t with every inequality at least tI, tr Y <= n")
@@ -402,6 +436,22 @@ impl Report {
         line("theorem", word(&self.theorem));
         if let Some(objective) = self.objective {
             line("objective", format!("{}  ({})", decimal(objective, 10, Rounding::Nearest), self.objective_is));
+        }
+        if let (Some(achieved), Some(share)) = (self.achieved, self.back_off) {
+            let attained = self.optimum_is_attained.unwrap_or(true);
+            let of = if attained { "the optimum" } else { "what the solver came to, an optimum that is not attained" };
+            let given = match share > 0.0 {
+                true => format!(
+                    "{}  (up to {} % of {of} given back for a smaller gain)",
+                    at_least(achieved),
+                    about(100.0 * share)
+                ),
+                false => format!("{}  ({of}, with a moderate gain)", at_least(achieved)),
+            };
+            line("achieved", given);
+        }
+        if let Some(gain) = self.largest_gain {
+            line("largest gain", about(gain));
         }
         if let Some(k) = &self.k {
             for (place, k) in self.places.iter().zip(k) {

@@ -14,7 +14,7 @@ use lpv::model::{FrozenModel, GridModel, Polytope, linearize};
 use lpv::plant::{PlantSpec, QuadrotorParameters};
 use lpv::sim::Outcome;
 use lpv::synthesis::Design;
-use lpv::synthesis::polytopic::{Lyapunov, Objective, PolytopicRequest, UnstabilizablePoint, synthesize};
+use lpv::synthesis::polytopic::{BackOff, Lyapunov, Objective, PolytopicRequest, UnstabilizablePoint, synthesize};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -117,6 +117,7 @@ fn arcs(fleet: &Fleet) -> Result<Vec<Entry>, Failure> {
         saturation: None,
         high_gain: None,
         objective: Objective::Trace,
+        back_off: BackOff::Nothing,
     };
     let solve = |models: &[FrozenModel]| {
         synthesize(&Polytope::hull(models), &stabilize)

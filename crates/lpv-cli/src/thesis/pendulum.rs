@@ -12,7 +12,9 @@ use lpv::model::Polytope;
 use lpv::plant::Pendulum;
 use lpv::sim::{AdaptiveOptions, ContinuousFlight, fly_continuously, optimal_trajectory};
 use lpv::synthesis::CostWeights;
-use lpv::synthesis::polytopic::{Lyapunov, Objective, PolytopicRequest, Solution, rate_box_vertices, synthesize};
+use lpv::synthesis::polytopic::{
+    BackOff, Lyapunov, Objective, PolytopicRequest, Solution, rate_box_vertices, synthesize,
+};
 use std::f64::consts::PI;
 
 /// x(0) of Table 4.1, which the text does not state; ρ(0) = (0, 1) there.
@@ -51,7 +53,14 @@ fn design(lyapunov: Lyapunov) -> Result<Solution, Failure> {
 }
 
 fn optimized(lyapunov: Lyapunov, objective: Objective) -> Result<Solution, Failure> {
-    let request = PolytopicRequest { weights: Some(weights()), lyapunov, saturation: None, high_gain: None, objective };
+    let request = PolytopicRequest {
+        weights: Some(weights()),
+        lyapunov,
+        saturation: None,
+        high_gain: None,
+        objective,
+        back_off: BackOff::Nothing,
+    };
     let failed = |source| Failure::Synthesis { controller: "pendulum".into(), source };
     let design = synthesize(&polytope(), &request).map_err(failed)?;
     design.solution.ok_or_else(|| Failure::Defect("the pendulum has no regulator".into()))

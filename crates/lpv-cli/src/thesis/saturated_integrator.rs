@@ -12,7 +12,7 @@ use lpv::model::{Polytope, linearize};
 use lpv::plant::DoubleIntegrator;
 use lpv::sim::{AdaptiveOptions, ContinuousFlight, fly_continuously};
 use lpv::synthesis::CostWeights;
-use lpv::synthesis::polytopic::{InputBounds, Lyapunov, Objective, PolytopicRequest, Solution, synthesize};
+use lpv::synthesis::polytopic::{BackOff, InputBounds, Lyapunov, Objective, PolytopicRequest, Solution, synthesize};
 
 /// R of (5.5); Q = I.
 const R: f64 = 0.001;
@@ -183,6 +183,7 @@ fn slqr(sigma: f64, gamma: f64) -> Result<Regulated, Failure> {
         saturation: Some(InputBounds { sigma: vec![sigma], gamma }),
         high_gain: None,
         objective: Objective::Trace,
+        back_off: BackOff::Nothing,
     };
     let failed = |source| Failure::Synthesis { controller: "double integrator".into(), source };
     let design = synthesize(&Polytope::hull(&[model]), &request).map_err(failed)?;

@@ -7,7 +7,8 @@ use lpv::math::eigen::{smallest_eigenvalue, spectral_abscissa};
 use lpv::math::matrix::{diagonal, from_rows, quadratic_form};
 use lpv::model::{GridModel, Polytope, linearize};
 use lpv::synthesis::polytopic::{
-    HighGain, InputBounds, Lyapunov, Objective, PolytopicDesign, PolytopicRequest, rate_box_vertices, synthesize,
+    BackOff, HighGain, InputBounds, Lyapunov, Objective, PolytopicDesign, PolytopicRequest, rate_box_vertices,
+    synthesize,
 };
 use lpv::synthesis::{CostWeights, HighGainOptions};
 use serde::Deserialize;
@@ -24,6 +25,7 @@ fn request(weights: CostWeights) -> PolytopicRequest {
         saturation: None,
         high_gain: None,
         objective: Objective::Trace,
+        back_off: BackOff::Nothing,
     }
 }
 
@@ -101,6 +103,7 @@ fn optima_of_other_solvers() {
                 GoldenObjective::States { states, parameter } => Objective::States { states, parameter },
                 GoldenObjective::Ellipsoid { shape } => Objective::Ellipsoid { shape: from_rows(&shape) },
             },
+            back_off: BackOff::Nothing,
         };
         let found = solved(&polytope, &request).answer.objective;
         for (solver, optimum) in problem.optima {

@@ -17,11 +17,13 @@
 //! a common Y it is Σ ρᵢKᵢ.
 
 mod inequality;
+mod moderation;
 mod objective;
 mod rates;
 mod theorem;
 mod unstabilizable;
 
+pub use moderation::{BackOff, Moderation};
 pub use objective::Objective;
 pub use rates::rate_box_vertices;
 pub use theorem::Theorem;
@@ -35,6 +37,7 @@ use crate::math::matrix::{inverse_spd, symmetric_part};
 use crate::model::{FrozenModel, Polytope};
 use inequality::{DoubleSum, Unknowns, Weights};
 use lmi::{Answer, Carrier, Explanation, Expr, Options, Outcome, Problem};
+use moderation::{COST_LADDER, MARGIN_LADDER, Moderated, Stage};
 
 /// The Lyapunov function xᵀY(ρ)⁻¹x.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +73,8 @@ pub struct PolytopicRequest {
     pub high_gain: Option<HighGain>,
     /// What is optimised. Stabilisation has its own: the largest margin.
     pub objective: Objective,
+    /// How much of the optimum is given back for a gain that can be applied.
+    pub back_off: BackOff,
 }
 
 /// How the gain on K_s = F + s(R⁻¹BᵀP − F) is chosen.
@@ -84,8 +89,11 @@ pub struct HighGain {
 /// What was found, whatever the outcome.
 #[derive(Debug)]
 pub struct PolytopicDesign {
-    /// The solver's answer: outcome, objective, blocks with rigorous margins, witness.
+    /// The solver's answer: outcome, blocks with rigorous margins, witness. Of a design for which a part of the optimum was given
+    /// back it is the second stage's, and its objective the effort.
     pub answer: Answer,
+    /// What was given back of the optimum; `None` where nothing was asked for.
+    pub moderation: Option<Moderation>,
     /// Why there is no solution, where there is none.
     pub explanation: Option<Explanation>,
     /// A point of the polytope that no input can stabilise: where there is one there is no solution, whatever the solver says.
@@ -95,6 +103,20 @@ pub struct PolytopicDesign {
 }
 
 impl PolytopicDesign {
+    /// The optimum of what was asked for, whatever was given back of it.
+    pub fn optimum(&self) -> f64 {
+        match &self.moderation {
+            // least cost bounds are posed as their negative
+            Some(moderation) => moderation.optimum.abs(),
+            None => self.answer.objective,
+        }
+    }
+
+    /// What the design that is returned has of it.
+    pub fn achieved(&self) -> f64 {
+        self.moderation.as_ref().map_or(self.answer.objective, |moderation| moderation.achieved.abs())
+    }
+
     /// Whether it is refuted, by the solver's witness or by a point that cannot be stabilised.
     pub fn is_infeasible(&self) -> bool {
         self.unstabilizable.is_some() || matches!(self.answer.outcome, Outcome::Infeasible(_))
@@ -181,8 +203,21 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     let terms = sum.stability_terms();
     let answer = problem.solve(&solver())?;
     let solved = matches!(answer.outcome, Outcome::Solved);
+    let moderated = |answer: Answer| -> Result<PolytopicDesign, SynthesisError> {
+        let identity = Mat::identity(polytope.inputs(), polytope.inputs());
+        let stage = Stage {
+            problem: &problem,
+            objective: &t,
+            l: &unknowns.l,
+            y: &unknowns.y,
+            r_inverse: &identity,
+            ladder: &MARGIN_LADDER,
+        };
+        let moderated = stage.moderate(answer, request.back_off, &solver())?;
+        finish(&problem, moderated, &unknowns, None)
+    };
     if solved && answer.objective > LEAST_MARGIN {
-        return finish(&problem, answer, &unknowns, None);
+        return moderated(answer);
     }
     // the scale allows t = 0 always: what there is nothing above for is said by a point, or by the strict problem's witness
     if rests(&request.lyapunov)
@@ -192,6 +227,7 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
         let explanation = Explanation { distance: 0.0, carriers: carriers(&point) };
         return Ok(PolytopicDesign {
             answer,
+            moderation: None,
             explanation: Some(explanation),
             unstabilizable: Some(point),
             solution: None,
@@ -199,7 +235,7 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     }
     match solved {
         true => stabilize_strictly(polytope, request),
-        false => finish(&problem, answer, &unknowns, None),
+        false => moderated(answer),
     }
 }
 
@@ -240,7 +276,7 @@ fn stabilize_strictly(polytope: &Polytope, request: &PolytopicRequest) -> Result
         strict.positive_definite_by(format!("Y{} ⪰ I", i + 1), *y - Expr::identity(n), 0.0);
     }
     let answer = strict.solve(&solver())?;
-    finish(&strict, answer, &unknowns, None)
+    finish(&strict, answer.into(), &unknowns, None)
 }
 
 /// Margin of stability, of tr Y = n, below which the answer is taken for zero.
@@ -287,7 +323,7 @@ fn regulate(
             problem.positive_definite(name, block);
         }
     }
-    request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
+    let objective = request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
     let answer = problem.solve(&solver())?;
     if matches!(answer.outcome, Outcome::Inaccurate(_) | Outcome::Infeasible(_)) {
         let stabilization = stabilize(polytope, request)?;
@@ -295,10 +331,20 @@ fn regulate(
             return Ok(stabilization);
         }
     }
-    let mut design = finish(&problem, answer, &unknowns, auxiliary.as_deref())?;
+    let low_l: Vec<Expr> = auxiliary.clone().unwrap_or_else(|| unknowns.l.clone());
+    let stage = Stage {
+        problem: &problem,
+        objective: &objective,
+        l: &low_l,
+        y: &unknowns.y,
+        r_inverse: &weights.r_inverse,
+        ladder: &COST_LADDER,
+    };
+    let moderated = stage.moderate(answer, request.back_off, &solver())?;
+    let shrink = moderated.shrink;
+    let mut design = finish(&problem, moderated, &unknowns, auxiliary.as_deref())?;
     let (Some(solution), Some(high_gain)) = (&mut design.solution, request.high_gain) else { return Ok(design) };
     let low = solution.auxiliary_gain.take().unwrap_or_else(|| solution.gain.clone());
-    let low_l: Vec<Expr> = auxiliary.clone().unwrap_or_else(|| unknowns.l.clone());
     let mut s = choose(polytope, cost, &solution.p, &low, &high_gain)?;
     // with a general R the inequalities decide; s = 0 satisfies them, so halving ends
     let on_segment = |s: f64| -> Vec<Expr> {
@@ -316,7 +362,8 @@ fn regulate(
             halvings += 1;
         }
     }
-    solution.l = on_segment(s).iter().map(|l| design.answer.value(l)).collect();
+    let shrunk = |l: &Expr| scaled(&design.answer.value(l), 1.0 / shrink);
+    solution.l = on_segment(s).iter().map(shrunk).collect();
     solution.gain = solution.l.iter().zip(&solution.p).map(|(l, p)| l * p).collect();
     solution.auxiliary_gain = Some(low);
     solution.s = Some(s);
@@ -355,6 +402,10 @@ fn distinct<'a>(y: &'a [Expr], lyapunov: &Lyapunov) -> Vec<&'a Expr> {
     }
 }
 
+fn scaled(matrix: &Mat<f64>, factor: f64) -> Mat<f64> {
+    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| factor * matrix[(i, j)])
+}
+
 fn is_diagonal(matrix: &Mat<f64>) -> bool {
     (0..matrix.nrows()).all(|i| (0..matrix.ncols()).all(|j| i == j || matrix[(i, j)] == 0.0))
 }
@@ -362,15 +413,17 @@ fn is_diagonal(matrix: &Mat<f64>) -> bool {
 /// Read the matrices from the answer; explain it where it is infeasible.
 fn finish(
     problem: &Problem,
-    answer: Answer,
+    moderated: Moderated,
     unknowns: &Unknowns,
     auxiliary: Option<&[Expr]>,
 ) -> Result<PolytopicDesign, SynthesisError> {
+    let Moderated { answer, shrink, moderation } = moderated;
     let explanation = problem.explain(&answer, &solver())?;
     let solution = match answer.outcome {
         Outcome::Solved | Outcome::Inaccurate(_) => {
-            let values =
-                |of: &[Expr]| -> Vec<Mat<f64>> { of.iter().map(|expression| answer.value(expression)).collect() };
+            let values = |of: &[Expr]| -> Vec<Mat<f64>> {
+                of.iter().map(|expression| scaled(&answer.value(expression), 1.0 / shrink)).collect()
+            };
             let y: Vec<Mat<f64>> = values(&unknowns.y).iter().map(symmetric_part).collect();
             let l = values(&unknowns.l);
             let p: Option<Vec<Mat<f64>>> = y.iter().map(inverse_spd).collect();
@@ -386,5 +439,5 @@ fn finish(
         }
         Outcome::Infeasible(_) | Outcome::Unbounded(_) => None,
     };
-    Ok(PolytopicDesign { answer, explanation, unstabilizable: None, solution })
+    Ok(PolytopicDesign { answer, moderation, explanation, unstabilizable: None, solution })
 }

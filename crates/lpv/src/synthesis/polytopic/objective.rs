@@ -24,12 +24,14 @@ pub enum Objective {
 }
 
 impl Objective {
-    /// Pose it for the Yᵢ: `distinct` without repetition, `vertices` one for each vertex.
-    pub(super) fn pose(&self, problem: &mut Problem, distinct: &[&Expr], vertices: &[Expr]) {
+    /// Pose it for the Yᵢ: `distinct` without repetition, `vertices` one for each vertex. Returned is what is to be as large as
+    /// possible: the trace, or −t.
+    pub(super) fn pose(&self, problem: &mut Problem, distinct: &[&Expr], vertices: &[Expr]) -> Expr {
         match self {
             Objective::Trace => {
                 let trace = distinct.iter().fold(Expr::zeros(1, 1), |sum, y| sum + y.trace());
                 problem.maximize(&trace);
+                trace
             }
             Objective::States { states, parameter } => {
                 let n = vertices[0].nrows();
@@ -50,6 +52,7 @@ impl Objective {
                     }
                 }
                 problem.minimize(&t);
+                -1.0 * t
             }
             Objective::Ellipsoid { shape } => {
                 let n = vertices[0].nrows();
@@ -61,6 +64,7 @@ impl Objective {
                         .positive_definite(format!("cost bound of the ellipsoid{}", vertex(i, distinct.len())), block);
                 }
                 problem.minimize(&t);
+                -1.0 * t
             }
         }
     }

@@ -1,0 +1,177 @@
+//! A gain that can be applied, for a stated part of the optimum.
+//!
+//! The supremum of tr Y, or of the margin of stability, is usually not attained over a polytope: L is free, and a maximising
+//! sequence drives Y to singular and K = LY⁻¹ to infinity. So the optimum f* is found first, and then, with a share β of it given
+//! back, the design whose input is smallest on its own ellipsoid:
+//!
+//! ```text
+//! minimise τ   subject to   the inequalities of the design,   f ≥ f* − β|f*|,
+//!
+//! ⎡ τ R⁻¹  Lᵢ ⎤ ⪰ 0 at every vertex:   uᵀRu ≤ τ on {x: V ≤ 1} for u = −K(ρ)x.
+//! ⎣ Lᵢᵀ    Yᵢ ⎦
+//! ```
+//!
+//! Both sides are quadratic in x, so that the measure has no unit of its own: it is the same for every scale of states, inputs and
+//! time. Of a high gain it is the low gain F that is kept small; K is then the chosen share of the way to R⁻¹BᵀP.
+//!
+//! At its optimum the second problem rests on its boundary as the first does. What is returned is (Y, L)/(1 + ε): for
+//! W(P) = P(A − BK) + (A − BK)ᵀP + Q + KᵀRK ⪯ 0, W((1 + ε)P) = (1 + ε)W(P) − ε(Q + KᵀRK), and |kx| ≤ σ on V ≤ γ becomes strict, which
+//! pays for the rounding of K and P.
+
+use crate::math::Mat;
+use crate::math::eigen::symmetric_eigenvalues;
+use crate::math::matrix::{inverse_spd, semidefinite_factor};
+use lmi::{Answer, Error, Expr, Options, Outcome, Problem};
+use serde::Serialize;
+
+/// How much of the optimum is given back.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum BackOff {
+    /// Nothing: the bare optimum, or what the solver reached on the way to one that is not attained.
+    #[default]
+    Nothing,
+    /// The least share of a short ladder after which more of it hardly makes the gain smaller; nothing where the optimum's gain is moderate.
+    Knee,
+    /// β, 0 < β < 1.
+    Share(f64),
+}
+
+/// What was given back, and for what.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Moderation {
+    /// β: the objective of the design is within this share of the optimum.
+    pub back_off: f64,
+    /// f*, as the solver found it; of an optimum that is not attained what it came to.
+    pub optimum: f64,
+    /// Whether f* is the optimum to the solver's tolerance.
+    pub is_attained: bool,
+    /// f of the design that is returned.
+    pub achieved: f64,
+    /// The largest √(uᵀRu) of the bare optimum's gain on {V ≤ 1}, V of the design with the largest share given back; infinite where
+    /// it has no definite Y.
+    pub effort_at_optimum: f64,
+    /// The same of the design that is returned.
+    pub effort: f64,
+}
+
+/// Shares of a cost that are tried, ascending.
+pub(super) const COST_LADDER: [f64; 4] = [1e-3, 1e-2, 5e-2, 1e-1];
+/// Shares of a margin of stability, which costs nobody anything.
+pub(super) const MARGIN_LADDER: [f64; 3] = [1e-2, 1e-1, 5e-1];
+/// The knee: the effort is at most this many times that of the largest share.
+const KNEE: f64 = 2.0;
+/// ε of the strictness that is paid for rounding.
+const STRICTNESS: f64 = 1e-6;
+
+/// The first stage, as the second builds on it.
+pub(super) struct Stage<'a> {
+    /// The inequalities, with the optimum's objective.
+    pub problem: &'a Problem,
+    /// f, to be as large as possible.
+    pub objective: &'a Expr,
+    /// Lᵢ of the gain that is to be small.
+    pub l: &'a [Expr],
+    /// Yᵢ
+    pub y: &'a [Expr],
+    /// R⁻¹ ≻ 0
+    pub r_inverse: &'a Mat<f64>,
+    /// The shares that are tried, ascending.
+    pub ladder: &'a [f64],
+}
+
+/// The answer of a design, with what was given back for it.
+pub(super) struct Moderated {
+    /// Of the second stage, or the first's.
+    pub answer: Answer,
+    /// 1 + ε that Y and L are divided by.
+    pub shrink: f64,
+    /// `None` where nothing was asked for, or nothing is solved.
+    pub moderation: Option<Moderation>,
+}
+
+impl From<Answer> for Moderated {
+    /// The answer as it is.
+    fn from(answer: Answer) -> Self {
+        Self { answer, shrink: 1.0, moderation: None }
+    }
+}
+
+impl Stage<'_> {
+    /// The second stage after `answer`, the optimum's. Where it has no solution of its own the optimum is returned as it is.
+    ///
+    /// # Errors
+    /// Problems without meaning.
+    pub fn moderate(&self, answer: Answer, back_off: BackOff, options: &Options) -> Result<Moderated, Error> {
+        let is_attained = matches!(answer.outcome, Outcome::Solved);
+        let is_a_start = is_attained || matches!(answer.outcome, Outcome::Inaccurate(_));
+        let optimum = answer.value(self.objective)[(0, 0)];
+        if back_off == BackOff::Nothing || !is_a_start || !optimum.is_finite() {
+            return Ok(answer.into());
+        }
+        let ladder = match back_off {
+            BackOff::Share(share) => vec![share],
+            _ => self.ladder.to_vec(),
+        };
+        let largest = ladder[ladder.len() - 1];
+        let Some(most) = self.second(optimum, largest, options)? else { return Ok(answer.into()) };
+        let effort_at_optimum = self.effort(&answer, &most);
+        let moderation = |back_off: f64, design: &Answer, shrink: f64| Moderation {
+            back_off,
+            optimum,
+            is_attained,
+            achieved: design.value(self.objective)[(0, 0)] / shrink.powf(optimum.signum()),
+            effort_at_optimum,
+            effort: self.effort(design, &most),
+        };
+        let strictly = |back_off: f64, design: Answer| {
+            let (shrink, moderation) = (1.0 + STRICTNESS, moderation(back_off, &design, 1.0 + STRICTNESS));
+            Moderated { answer: design, shrink, moderation: Some(moderation) }
+        };
+        let enough = KNEE * self.effort(&most, &most);
+        if back_off == BackOff::Knee {
+            if is_attained && effort_at_optimum <= enough {
+                let moderation = moderation(0.0, &answer, 1.0);
+                return Ok(Moderated { answer, shrink: 1.0, moderation: Some(moderation) });
+            }
+            for &share in &ladder[..ladder.len() - 1] {
+                let second = self.second(optimum, share, options)?;
+                if let Some(second) = second.filter(|second| self.effort(second, &most) <= enough) {
+                    return Ok(strictly(share, second));
+                }
+            }
+        }
+        let design = most.clone();
+        Ok(strictly(largest, design))
+    }
+
+    /// The design of least effort with the share `share` of `optimum` given back; `None` where the solver does not find it.
+    fn second(&self, optimum: f64, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
+        let mut problem = self.problem.clone();
+        let tau = problem.scalar("effort");
+        let least = Expr::constant(Mat::from_fn(1, 1, |_, _| optimum - share * optimum.abs()));
+        problem.positive_definite_by("what is left of the optimum", self.objective - least, 0.0);
+        for (i, (l, y)) in self.l.iter().zip(self.y).enumerate() {
+            let block = Expr::symmetric_blocks(vec![vec![tau.times(self.r_inverse)], vec![l.t(), y.clone()]]);
+            problem.positive_definite_by(format!("effort at vertex {}", i + 1), block, 0.0);
+        }
+        problem.minimize(&tau);
+        let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
+        let answer = problem.solve(&options)?;
+        Ok(matches!(answer.outcome, Outcome::Solved).then_some(answer))
+    }
+
+    /// The largest √(uᵀRu) of u = −Kx over the vertices on the ellipsoid {V ≤ 1} of `measure`: √λ_max(R^½ K Y Kᵀ R^½) with
+    /// the K of `design` and the Y of `measure`. Infinite where Y of the design is not definite.
+    fn effort(&self, design: &Answer, measure: &Answer) -> f64 {
+        let Some(root) = inverse_spd(self.r_inverse).and_then(|r| semidefinite_factor(&r)) else {
+            return f64::INFINITY;
+        };
+        let at = |(l, y): (&Expr, &Expr)| {
+            let Some(p) = inverse_spd(&design.value(y)) else { return f64::INFINITY };
+            let weighted = root.transpose() * design.value(l) * p;
+            let effort = &weighted * measure.value(y) * weighted.transpose();
+            symmetric_eigenvalues(&effort).into_iter().fold(0.0, f64::max).sqrt()
+        };
+        self.l.iter().zip(self.y).map(at).fold(0.0, f64::max)
+    }
+}
