@@ -1,6 +1,6 @@
 //! `lpv certify`: prove, check or refute a saved design, from the plant alone.
 
-mod polytopic;
+pub mod polytopic;
 
 use crate::designs;
 use crate::failure::Failure;

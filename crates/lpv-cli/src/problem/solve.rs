@@ -1,9 +1,11 @@
 //! A problem solved, and its answer as text and for machines.
 
 use super::{ProblemPlan, Scope};
+use crate::certify::polytopic;
 use crate::failure::Failure;
+use crate::scenario::door::Door;
 use lmi::{Explanation, Outcome, Witness};
-use lpv::certificate::Verdict;
+use lpv::certificate::{Claim, Record, Verdict, worst};
 use lpv::math::Mat;
 use lpv::math::decimal::{Rounding, about, at_least, decimal, fixed};
 use lpv::math::eigen::symmetric_eigenvalues;
@@ -11,13 +13,18 @@ use lpv::math::matrix::{quadratic_form, to_rows};
 use lpv::model::{FrozenModel, Polytope};
 use lpv::synthesis::SynthesisError;
 use lpv::synthesis::polytopic::{
-    Lyapunov, Moderation, PolytopicDesign, PolytopicRequest, Solution, Theorem, UnstabilizablePoint, frozen, synthesize,
+    BackOff, Lyapunov, Moderation, PolytopicDesign, PolytopicRequest, Solution, Theorem, UnstabilizablePoint, frozen,
+    synthesize,
 };
 use serde::Serialize;
 use serde::ser::SerializeMap;
+use std::path::Path;
 use std::time::Instant;
 
 type Rows = Vec<Vec<f64>>;
+
+/// The word for a design that is one.
+const SOLVED: &str = "solved";
 
 /// What `lpv design PROBLEM.toml --json` prints.
 #[derive(Serialize)]
@@ -139,8 +146,40 @@ impl Serialize for Margins {
     }
 }
 
-/// Solve the problem.
-pub fn solve(plan: &ProblemPlan, path: &std::path::Path) -> Result<Report, Failure> {
+/// Shares of the optimum that are given back in turn until the design is proved, where the file names none.
+const PROVABLE: [BackOff; 5] =
+    [BackOff::Knee, BackOff::Share(0.05), BackOff::Share(0.1), BackOff::Share(0.2), BackOff::Share(0.4)];
+
+/// Solve the problem. What is called solved is proved: every claim of `lpv certify` about the file that is written.
+pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
+    let tried: &[BackOff] = if plan.back_off == BackOff::Knee { &PROVABLE } else { &[plan.back_off] };
+    let started = Instant::now();
+    let mut iterations = 0;
+    let mut first = None;
+    for &back_off in tried {
+        let mut report = solve_with(plan, path, back_off)?;
+        iterations += report.iterations;
+        let claims = match report.status {
+            SOLVED => claims(&report, path)?,
+            _ => Vec::new(),
+        };
+        report.iterations = iterations;
+        report.seconds = started.elapsed().as_secs_f64();
+        if report.status != SOLVED || report.is_proved_by(plan, &claims) {
+            return Ok(first.filter(|_| report.status != SOLVED).unwrap_or(report));
+        }
+        first.get_or_insert(report);
+    }
+    first.ok_or_else(|| Failure::Defect("no back-off was tried".into()))
+}
+
+/// What `lpv certify` says of the report as a file.
+fn claims(report: &Report, path: &Path) -> Result<Vec<Claim>, Failure> {
+    let text = serde_json::to_string(report).map_err(|error| Failure::serialisation(&error))?;
+    polytopic::claims(&Door { file: path }, &text, None, &mut Record::default())
+}
+
+fn solve_with(plan: &ProblemPlan, path: &Path, back_off: BackOff) -> Result<Report, Failure> {
     let request = PolytopicRequest {
         weights: plan.weights.clone(),
         lyapunov: match &plan.scope {
@@ -150,7 +189,7 @@ pub fn solve(plan: &ProblemPlan, path: &std::path::Path) -> Result<Report, Failu
         saturation: plan.saturation.clone(),
         high_gain: plan.high_gain,
         objective: plan.objective.clone(),
-        back_off: plan.back_off,
+        back_off,
     };
     let failed = |error| failure_at(plan, path, error);
     let started = Instant::now();
@@ -169,7 +208,7 @@ pub fn solve(plan: &ProblemPlan, path: &std::path::Path) -> Result<Report, Failu
 }
 
 /// A failure of synthesis, which counts the places from zero, in the words of the file.
-fn failure_at(plan: &ProblemPlan, path: &std::path::Path, error: SynthesisError) -> Failure {
+fn failure_at(plan: &ProblemPlan, path: &Path, error: SynthesisError) -> Failure {
     let place = |rho: f64| plan.places.get(rho as usize).map_or("the initial parameter", String::as_str);
     let message = match &error {
         SynthesisError::SampleTime { rho, sample_time_s } => format!(
@@ -223,6 +262,7 @@ fn report(
 ) -> Report {
     let severity = |design: &PolytopicDesign| match design.answer.outcome {
         _ if design.is_infeasible() => 3,
+        _ if design.is_solved() => 0,
         Outcome::Unbounded(_) => 2,
         Outcome::Inaccurate(_) => 1,
         _ => 0,
@@ -312,7 +352,8 @@ fn largest_singular_value(k: &Mat<f64>) -> f64 {
 fn status(design: &PolytopicDesign) -> &'static str {
     match design.answer.outcome {
         _ if design.is_infeasible() => "infeasible",
-        Outcome::Solved => "solved",
+        _ if design.is_solved() => SOLVED,
+        Outcome::Solved => "inaccurate",
         Outcome::Infeasible(_) => "infeasible",
         Outcome::Unbounded(_) => "unbounded",
         Outcome::Inaccurate(_) => "inaccurate",
@@ -345,21 +386,23 @@ fn verdict(plan: &ProblemPlan, design: &PolytopicDesign, inside: Option<bool>) -
     if let Some(point) = &design.unstabilizable {
         return (Verdict::Refuted, unstabilizable(plan, point));
     }
+    let solved = design.is_solved();
     match (&design.answer.outcome, &plan.scope, inside) {
-        (Outcome::Solved, _, Some(false)) => {
+        (_, _, Some(false)) if solved => {
             (Verdict::Undecided, "the initial state is outside the certified set: x(0)'P x(0) > gamma, and nothing is claimed from there".into())
         }
-        (Outcome::Solved, Scope::Frozen, _) if plan.models.len() > 1 => (
+        (_, Scope::Frozen, _) if solved && plan.models.len() > 1 => (
             Verdict::Undecided,
             "frozen design: the inequalities hold at each point for a parameter at rest; nothing is claimed once it moves".into(),
         ),
-        (Outcome::Solved, Scope::Polytope(Lyapunov::ParameterDependent { .. }), _) => (
+        (_, Scope::Polytope(Lyapunov::ParameterDependent { .. }), _) if solved => (
             Verdict::Numerical,
-            "verified for Y and L at all vertices, for every parameter in the polytope with a rate in the hull of the rate vertices; K is rounded; lpv certify proves the file of -o".into(),
+            "verified for Y and L at all vertices, for every parameter in the polytope with a rate in the hull of the rate vertices".into(),
         ),
-        (Outcome::Solved, _, _) => {
-            (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope; K is rounded; lpv certify proves the file of -o".into())
+        _ if solved => {
+            (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope".into())
         }
+        (Outcome::Solved, _, _) => (Verdict::Undecided, "Y is singular".into()),
         (Outcome::Inaccurate(reason), _, _) => {
             (Verdict::Undecided, format!("the solver stopped short: {reason}"))
         }
@@ -428,6 +471,30 @@ fn witness(design: &PolytopicDesign) -> Option<Vec<NamedMultiplier>> {
 }
 
 impl Report {
+    /// Take the verdict from the `claims` about the file; whether all of them are proved. What is not is no solution.
+    fn is_proved_by(&mut self, plan: &ProblemPlan, claims: &[Claim]) -> bool {
+        if worst(claims) == Verdict::Proved {
+            if self.verdict == Verdict::Numerical {
+                self.verdict = Verdict::Proved;
+                self.verdict_reason = self.verdict_reason.replace(
+                    "verified for Y and L at all vertices",
+                    "every claim of lpv certify about K and P as they are printed",
+                );
+            }
+            return true;
+        }
+        let open = claims.iter().find(|claim| claim.verdict != Verdict::Proved);
+        let open = open.map_or(String::new(), |claim| format!(": \"{}\" is {}", claim.claim, claim.verdict.word()));
+        self.status = "inaccurate";
+        self.verdict = Verdict::Undecided;
+        let remedy = match plan.back_off {
+            BackOff::Knee => "weights, limits or units of less different size may help",
+            _ => "give more of the optimum back, or leave back_off out",
+        };
+        self.verdict_reason = format!("the design that was found cannot be proved{open}; {remedy}");
+        false
+    }
+
     /// The answer as text.
     pub fn text(&self) -> String {
         let mut text = String::new();
@@ -453,7 +520,7 @@ impl Report {
         if let Some(gain) = self.largest_gain {
             line("largest gain", about(gain));
         }
-        if let Some(k) = &self.k {
+        if let Some(k) = self.k.as_ref().filter(|_| self.status == SOLVED) {
             for (place, k) in self.places.iter().zip(k) {
                 for (i, row) in k.iter().enumerate() {
                     let numbers: Vec<String> = row.iter().map(|value| format!("{:>13}", fixed(*value, 6))).collect();
@@ -485,11 +552,11 @@ impl Report {
     }
 
     /// The failure that the status is, if it is one.
-    pub fn failure(&self, path: &std::path::Path) -> Option<Failure> {
+    pub fn failure(&self, path: &Path) -> Option<Failure> {
         let place = self.place.as_ref().map_or(String::new(), |place| format!(" at {place}"));
         let message = format!("{}: {}{place}: {}", path.display(), self.status, self.verdict_reason);
         match self.status {
-            "solved" => None,
+            SOLVED => None,
             "inaccurate" => Some(Failure::NotCertified(message)),
             _ => Some(Failure::NoOptimum(message + &self.relaxation())),
         }

@@ -103,6 +103,11 @@ pub struct PolytopicDesign {
 }
 
 impl PolytopicDesign {
+    /// Whether Y and L satisfy every inequality, with a proved margin: at the optimum, or with a part of it given back.
+    pub fn is_solved(&self) -> bool {
+        self.solution.is_some() && (self.moderation.is_some() || matches!(self.answer.outcome, Outcome::Solved))
+    }
+
     /// The optimum of what was asked for, whatever was given back of it.
     pub fn optimum(&self) -> f64 {
         match &self.moderation {

@@ -89,6 +89,12 @@ pub(super) struct Moderated {
     pub moderation: Option<Moderation>,
 }
 
+/// Whether every inequality is proved at the point of an answer. That its own objective is not at its optimum is no harm.
+fn is_feasible(answer: &Answer) -> bool {
+    let has_point = matches!(answer.outcome, Outcome::Solved | Outcome::Inaccurate(_));
+    has_point && answer.blocks.iter().all(|block| block.verified_lower_bound > 0.0)
+}
+
 impl From<Answer> for Moderated {
     /// The answer as it is.
     fn from(answer: Answer) -> Self {
@@ -157,7 +163,7 @@ impl Stage<'_> {
         problem.minimize(&tau);
         let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
         let answer = problem.solve(&options)?;
-        Ok(matches!(answer.outcome, Outcome::Solved).then_some(answer))
+        Ok(is_feasible(&answer).then_some(answer))
     }
 
     /// The largest √(uᵀRu) of u = −Kx over the vertices on the ellipsoid {V ≤ 1} of `measure`: √λ_max(R^½ K Y Kᵀ R^½) with
