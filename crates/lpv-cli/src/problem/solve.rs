@@ -163,7 +163,7 @@ fn failure_at(plan: &ProblemPlan, path: &std::path::Path, error: SynthesisError)
              sample faster, or ask for less gain_margin",
             place(*rho)
         ),
-        SynthesisError::Riccati { rho, source } => format!("no regulator exists at {}: {source}", place(*rho)),
+        SynthesisError::Riccati { rho, source } => format!("no regulator was found at {}: {source}", place(*rho)),
         SynthesisError::Unbounded { rho } => {
             format!("tr Y is unbounded at {}: some state costs nothing; give it a positive weight in Q", place(*rho))
         }

@@ -1,7 +1,8 @@
 //! The continuous algebraic Riccati equation Aᵀ P + P A − P B R⁻¹ Bᵀ P + Q = 0, thesis (2.31).
 
 use super::matrix::{blocks_2x2, identity, inverse, inverse_spd, is_finite, least_squares, symmetric_part};
-use super::{Mat, eigen, lyapunov};
+use super::stabilizability::{Mode, Stabilizability, stabilizability};
+use super::{Mat, lyapunov};
 
 /// The stabilising solution of the Riccati equation and the gain that it gives.
 #[derive(Clone, Debug)]
@@ -18,14 +19,9 @@ pub enum RiccatiError {
     /// R is not symmetric positive definite.
     #[error("the input weight R is not positive definite")]
     InputWeight,
-    /// (A, B) is not stabilisable.
-    #[error("the pair (A, B) is not stabilisable: no input moves the mode {re:.6} {im:+.6}i")]
-    Unstabilizable {
-        /// Real part of the eigenvalue.
-        re: f64,
-        /// Imaginary part of the eigenvalue.
-        im: f64,
-    },
+    /// (A, B) is not stabilisable, which is decided exactly.
+    #[error("the pair (A, B) is not stabilisable: no input moves {0}, which does not decay by itself")]
+    Unstabilizable(Mode),
     /// The Hamiltonian matrix has eigenvalues on the imaginary axis, or too close to it for its arithmetic.
     #[error(
         "the Hamiltonian matrix has eigenvalues on the imaginary axis, to rounding: a mode of A there costs nothing (weigh it \
@@ -49,8 +45,8 @@ pub enum RiccatiError {
 pub fn solve(a: &Mat<f64>, b: &Mat<f64>, q: &Mat<f64>, r: &Mat<f64>) -> Result<Regulator, RiccatiError> {
     let n = a.nrows();
     let r_inverse = inverse_spd(r).ok_or(RiccatiError::InputWeight)?;
-    if let Some((re, im)) = eigen::unstabilizable_mode(a, b) {
-        return Err(RiccatiError::Unstabilizable { re, im });
+    if let Stabilizability::Unstabilizable(mode) = stabilizability(a, b) {
+        return Err(RiccatiError::Unstabilizable(mode));
     }
     let g = b * &r_inverse * b.transpose();
     let minus = |m: &Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| -m[(i, j)]);
@@ -103,6 +99,7 @@ fn matrix_sign(mut s: Mat<f64>) -> Option<Mat<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::eigen;
     use crate::math::matrix::{diagonal, from_rows};
     use proptest::prelude::*;
 
@@ -153,7 +150,8 @@ mod tests {
         let a = diagonal(&[1.0, -1.0]);
         let b = from_rows(&[vec![0.0], vec![1.0]]);
         let error = solve(&a, &b, &identity(2), &identity(1)).unwrap_err();
-        assert_eq!(error, RiccatiError::Unstabilizable { re: 1.0, im: 0.0 });
+        let words = "the pair (A, B) is not stabilisable: no input moves x1 (λ = 1), which does not decay by itself";
+        assert_eq!(error.to_string(), words);
         assert_eq!(solve(&a, &b, &identity(2), &diagonal(&[-1.0])).unwrap_err(), RiccatiError::InputWeight);
     }
 }

@@ -46,7 +46,7 @@ pub use validation::DesignError;
 #[derive(Debug, thiserror::Error)]
 pub enum SynthesisError {
     /// The Riccati equation has no stabilising solution.
-    #[error("no regulator exists at parameter {rho:.6}: {source}")]
+    #[error("no regulator was found at parameter {rho:.6}: {source}")]
     Riccati {
         /// Parameter value.
         rho: f64,

@@ -6,8 +6,9 @@
 //! between rounding errors; here the multipliers Zᵢⱼ of its last iterate are read instead: Zᵢⱼ ≈ ρᵢρⱼwwᵀ.
 
 use crate::math::Mat;
-use crate::math::eigen::{eigenvalues, smallest_singular_vector, symmetric_eigenvectors, unstabilizable_mode};
+use crate::math::eigen::{eigenvalues, smallest_singular_vector, symmetric_eigenvectors};
 use crate::math::matrix::{least_squares, quadratic_form, trace};
+use crate::math::stabilizability::{Stabilizability, pencil, stabilizability};
 use crate::model::Polytope;
 use serde::Serialize;
 
@@ -35,13 +36,19 @@ const DECAY: f64 = 1e-9;
 /// Of the largest entry, what weighs a change of ρ against the equations.
 const DAMPING: f64 = 1e-6;
 
-/// A vertex that cannot be stabilised.
+/// A vertex that cannot be stabilised, which is decided exactly.
 pub(super) fn vertex(polytope: &Polytope) -> Option<UnstabilizablePoint> {
     (0..polytope.len()).find_map(|i| {
-        let (re, im) = unstabilizable_mode(polytope.a(i), polytope.b(i))?;
+        let Stabilizability::Unstabilizable(mode) = stabilizability(polytope.a(i), polytope.b(i)) else { return None };
         let mut weights = vec![0.0; polytope.len()];
         weights[i] = 1.0;
-        at(polytope, &weights, [re, im]).filter(|point| holds(polytope, point))
+        Some(UnstabilizablePoint {
+            weights,
+            eigenvalue: mode.eigenvalue,
+            direction: mode.direction,
+            direction_imaginary: mode.direction_imaginary,
+            residual: 0.0,
+        })
     })
 }
 
@@ -83,30 +90,6 @@ pub(super) fn point(
         w.clone_from(&best.as_ref()?.direction);
     }
     best.filter(|point| holds(polytope, point))
-}
-
-/// [A − λI, B]; for complex λ = μ + iν the real [A − μI, νI, B, 0; −νI, A − μI, 0, B], which (Re w, Im w) is multiplied with from the left.
-fn pencil(a: &Mat<f64>, b: &Mat<f64>, [re, im]: [f64; 2]) -> Mat<f64> {
-    let (n, m) = (a.nrows(), b.ncols());
-    let shifted = |i: usize, j: usize| a[(i, j)] - if i == j { re } else { 0.0 };
-    if im == 0.0 {
-        return Mat::from_fn(n, n + m, |i, j| if j < n { shifted(i, j) } else { b[(i, j - n)] });
-    }
-    Mat::from_fn(2 * n, 2 * (n + m), |i, j| {
-        let (lower, i) = (i >= n, i % n);
-        match j {
-            _ if j < 2 * n && (j >= n) == lower => shifted(i, j % n),
-            _ if j < 2 * n && i == j % n => {
-                if lower {
-                    -im
-                } else {
-                    im
-                }
-            }
-            _ if j >= 2 * n && (j - 2 * n >= m) == lower => b[(i, (j - 2 * n) % m)],
-            _ => 0.0,
-        }
-    })
 }
 
 /// The weights closest to `weights` with wᵀ[A(ρ) − λI, B(ρ)] = 0 for some λ, in the least-squares sense: the part of A(ρ)ᵀw across w,
