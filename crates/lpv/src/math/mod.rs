@@ -1,5 +1,5 @@
 //! Mathematics that the rest of the library stands on: scalars for several arithmetics (dual numbers, intervals, Taylor forms, balls of any precision), small matrix helpers,
-//! Riccati, Lyapunov and Stein equations, eigenvalues, angles, tensors and their higher-order singular value decomposition.
+//! Riccati, Lyapunov and Stein equations, eigenvalues, stabilisability, angles, tensors and their higher-order singular value decomposition.
 //!
 //! Dense linear algebra is [`faer`]'s, and it is named only here (and in crate `lmi`). Nothing here knows of plants
 //! or controllers.
@@ -24,5 +24,6 @@ pub mod stabilizability;
 pub mod stein;
 pub mod taylor;
 pub mod tensor;
+pub mod unmoved;
 
 pub use faer::Mat;

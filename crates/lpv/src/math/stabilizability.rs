@@ -43,6 +43,8 @@ pub struct Mode {
     pub direction: Vec<f64>,
     /// Im w, or Im v; empty where λ is real.
     pub direction_imaginary: Vec<f64>,
+    /// Proved: Re λ = 0.
+    pub is_on_axis: bool,
 }
 
 impl Mode {
@@ -146,7 +148,7 @@ fn decide(a: &Mat<f64>, b: &Mat<f64>) -> Stabilizability {
 }
 
 /// The matrix 2^s (m_ij 2^shift(i, j)) of integers, and s; `None` where an entry is not finite, or the integers would be too long.
-fn integers(m: &Mat<f64>, shift: impl Fn(usize, usize) -> i64) -> Option<(Integers, i64)> {
+pub(super) fn integers(m: &Mat<f64>, shift: impl Fn(usize, usize) -> i64) -> Option<(Integers, i64)> {
     let (rows, columns) = (m.nrows(), m.ncols());
     let entry = |i: usize, j: usize| {
         let (mantissa, exponent) = parts(m[(i, j)]);
@@ -278,6 +280,16 @@ impl Uncontrolled {
         found
     }
 
+    /// Whether a block is seen to have an eigenvalue on the imaginary axis: λ = 0, or the pair of a matrix of two rows without trace.
+    fn has_zero_on_axis(&self, block: &[usize]) -> bool {
+        let entries = block.iter().map(|&i| block.iter().map(|&j| self.a[i][j].clone()).collect()).collect();
+        match characteristic_polynomial(&entries).as_slice() {
+            [constant, ..] if constant.sign() == Sign::NoSign => true,
+            [constant, linear, _] => linear.sign() == Sign::NoSign && constant.sign() == Sign::Plus,
+            _ => false,
+        }
+    }
+
     /// The companion matrix of a block's characteristic polynomial.
     fn companion(&self, block: &[usize], scale: i64) -> Mat<f64> {
         let entries = block.iter().map(|&i| block.iter().map(|&j| self.a[i][j].clone()).collect()).collect();
@@ -324,12 +336,12 @@ impl Uncontrolled {
         let size = if is_negative { -largest(&parts) } else { largest(&parts) };
         parts.iter_mut().flatten().for_each(|x| *x /= size);
         let [direction, direction_imaginary] = parts;
-        Mode { eigenvalue: [re, im], direction, direction_imaginary }
+        Mode { eigenvalue: [re, im], direction, direction_imaginary, is_on_axis: self.has_zero_on_axis(block) }
     }
 }
 
 /// x/q · 2^e in floating point, to within a few units of the last place.
-fn quotient(x: &BigInt, q: &BigInt, e: i64) -> f64 {
+pub(super) fn quotient(x: &BigInt, q: &BigInt, e: i64) -> f64 {
     let leading = |x: &BigInt| {
         let shift = x.bits() as i64 - 62;
         let digits = if shift >= 0 { x >> shift } else { x << -shift };
@@ -439,6 +451,7 @@ mod tests {
                 "{found:?}"
             );
             assert_eq!((found.direction.len(), found.direction_imaginary.len()), (3, 3));
+            assert_eq!(found.is_on_axis, growth == 0.0);
             // the third state feels the two, and moves none of them
             assert_eq!((found.direction[2], found.direction_imaginary[2]), (0.0, 0.0));
         }
@@ -528,6 +541,7 @@ mod tests {
             eigenvalue,
             direction: direction.to_vec(),
             direction_imaginary: imaginary.to_vec(),
+            is_on_axis: false,
         };
         assert_eq!(mode(&[0.0, 1.0], &[], [0.0, 0.0]).combination(&names), "yaw");
         assert_eq!(mode(&[-0.5, 1.0, 0.25], &[], [0.0, 0.0]).combination(&names), "-0.5 roll + 1 yaw + 0.25 x3");
