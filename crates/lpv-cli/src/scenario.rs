@@ -14,7 +14,7 @@ use door::Door;
 use file::ScenarioFile;
 pub use file::engineers_words;
 use lpv::estimator::NoiseCovariance;
-use lpv::math::eigen::unstabilizable_mode;
+use lpv::math::stabilizability::{Stabilizability, stabilizability};
 use lpv::model::{GridModel, LpvModel};
 use lpv::plant::{Description, Plant, PlantSpec};
 use lpv::sim::{Reference, SetPoint};
@@ -116,7 +116,7 @@ impl Scenario {
         };
         let grid_points = grid_points(&door, file.model.grid_points, &*plant)?;
         let model = LpvModel::of_plant(&plant_spec, &*plant, grid_points);
-        stabilizable(&door, &model.grid)?;
+        stabilizable(&door, &model.grid, description)?;
 
         let simulation = file.simulation;
         let duration_s = door.positive("simulation.duration_s", simulation.duration_s)?;
@@ -315,13 +315,17 @@ fn grid_points(door: &Door, count: usize, plant: &dyn Plant) -> Result<usize, Fa
     }
 }
 
-fn stabilizable(door: &Door, model: &GridModel) -> Result<(), Failure> {
+/// Refuse a model that is proved not to be stabilisable; what cannot be told goes on to the design.
+fn stabilizable(door: &Door, model: &GridModel, description: &Description) -> Result<(), Failure> {
+    let names: Vec<String> = description.states.iter().map(|state| state.name.clone()).collect();
     for point in &model.points {
-        if let Some((re, im)) = unstabilizable_mode(&point.a, &point.b) {
+        if let Stabilizability::Unstabilizable(mode) = stabilizability(&point.a, &point.b) {
             let parameter =
                 model.scheduling.as_ref().map_or(String::new(), |s| format!(" at {} = {:.4}", s.parameter, point.rho));
             let message = format!(
-                "the pair (A, B) is not stabilisable{parameter}: no input moves the mode {re:.4} {im:+.4}i, which does not decay by itself"
+                "the pair (A, B) is not stabilisable{parameter}: no input moves {}, a mode that does not decay by itself (λ = {})",
+                mode.combination(&names),
+                mode.eigenvalue_words()
             );
             return door.refuse("plant", message);
         }

@@ -10,6 +10,8 @@ use lpv::math::Mat;
 use lpv::math::decimal::{Rounding, about, at_least, decimal, fixed};
 use lpv::math::eigen::symmetric_eigenvalues;
 use lpv::math::matrix::{quadratic_form, to_rows};
+use lpv::math::riccati::RiccatiError;
+use lpv::math::stabilizability::Mode;
 use lpv::model::{FrozenModel, Polytope};
 use lpv::synthesis::SynthesisError;
 use lpv::synthesis::polytopic::{
@@ -99,7 +101,7 @@ pub struct Report {
     verdict_reason: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     witness: Option<Vec<NamedMultiplier>>,
-    /// A point of the polytope that no input can stabilise, where that is the reason.
+    /// A point of the polytope that no input can stabilise, where that is the reason, or seems to be.
     #[serde(rename = "unstabilizable_point", skip_serializing_if = "Option::is_none")]
     unstabilizable: Option<UnstabilizablePoint>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -216,10 +218,26 @@ fn failure_at(plan: &ProblemPlan, path: &Path, error: SynthesisError) -> Failure
              sample faster, or ask for less gain_margin",
             place(*rho)
         ),
-        SynthesisError::Riccati { rho, source } => format!("no regulator exists at {}: {source}", place(*rho)),
-        SynthesisError::Unbounded { rho } => {
-            format!("tr Y is unbounded at {}: some state costs nothing; give it a positive weight in Q", place(*rho))
+        SynthesisError::Riccati { rho, source } => {
+            let mode = |mode: &Mode| format!("{} (λ = {})", mode.combination(&plan.states), mode.eigenvalue_words());
+            let why = match source {
+                RiccatiError::Unstabilizable(of) => {
+                    format!(
+                        "the pair (A, B) is not stabilisable: no input moves {}, which does not decay by itself",
+                        mode(of)
+                    )
+                }
+                RiccatiError::Unweighted(of) => {
+                    format!("{} costs nothing and does not decay by itself; give it a positive weight in Q", mode(of))
+                }
+                other => other.to_string(),
+            };
+            format!("no regulator was found at {}: {why}", place(*rho))
         }
+        SynthesisError::Unbounded { rho } => format!(
+            "tr Y grows without end at {}, as far as the solver sees: some state costs too little; give it a larger weight in Q",
+            place(*rho)
+        ),
         _ => return Failure::Synthesis { controller: path.display().to_string(), source: error },
     };
     Failure::NoOptimum(format!("{}: {message}", path.display()))
@@ -260,11 +278,10 @@ fn report(
     guaranteed: Option<f64>,
     seconds: f64,
 ) -> Report {
-    let severity = |design: &PolytopicDesign| match design.answer.outcome {
-        _ if design.is_infeasible() => 3,
-        _ if design.is_solved() => 0,
-        Outcome::Unbounded(_) => 2,
-        Outcome::Inaccurate(_) => 1,
+    let severity = |design: &PolytopicDesign| match status(design) {
+        "infeasible" => 3,
+        "unbounded" => 2,
+        "inaccurate" => 1,
         _ => 0,
     };
     let worst = (0..designs.len()).rev().max_by_key(|&k| severity(&designs[k])).unwrap_or(0);
@@ -353,6 +370,7 @@ fn status(design: &PolytopicDesign) -> &'static str {
     match design.answer.outcome {
         _ if design.is_infeasible() => "infeasible",
         _ if design.is_solved() => SOLVED,
+        _ if design.undetectable.is_some() => "unbounded",
         Outcome::Solved => "inaccurate",
         Outcome::Infeasible(_) => "infeasible",
         Outcome::Unbounded(_) => "unbounded",
@@ -383,8 +401,16 @@ fn objective(
 /// What a solved design is worth: its inequalities are verified for the Y and L that were found; what flies is K = LY⁻¹,
 /// rounded.
 fn verdict(plan: &ProblemPlan, design: &PolytopicDesign, inside: Option<bool>) -> (Verdict, String) {
-    if let Some(point) = &design.unstabilizable {
+    if let Some(point) = design.unstabilizable.as_ref().filter(|point| point.is_proved) {
         return (Verdict::Refuted, unstabilizable(plan, point));
+    }
+    if let Some(motion) = &design.undetectable {
+        let words = format!(
+            "the objective grows without end: the motion {} does not decay by itself (λ = {}) and costs nothing, so that no gain is the best; give it a positive weight in Q",
+            motion.combination(&plan.states),
+            motion.eigenvalue_words()
+        );
+        return (Verdict::Undecided, words);
     }
     let solved = design.is_solved();
     match (&design.answer.outcome, &plan.scope, inside) {
@@ -399,39 +425,46 @@ fn verdict(plan: &ProblemPlan, design: &PolytopicDesign, inside: Option<bool>) -
             Verdict::Numerical,
             "verified for Y and L at all vertices, for every parameter in the polytope with a rate in the hull of the rate vertices".into(),
         ),
+        _ if solved && design.riccati.is_some() => (
+            Verdict::Numerical,
+            format!(
+                "verified for Y and L at all vertices; K is the gain of the Riccati equation, and its P is made strict by the share {}",
+                about(design.riccati.unwrap_or(0.0))
+            ),
+        ),
         _ if solved => {
             (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope".into())
         }
         (Outcome::Solved, _, _) => (Verdict::Undecided, "Y is singular".into()),
         (Outcome::Inaccurate(reason), _, _) => {
-            (Verdict::Undecided, format!("the solver stopped short: {reason}"))
+            let seems = design.unstabilizable.as_ref().map_or(String::new(), |point| format!("; as far as rounding tells, {}", unstabilizable(plan, point)));
+            (Verdict::Undecided, format!("the solver stopped short: {reason}{seems}"))
         }
-        (Outcome::Infeasible(_), _, _) => (Verdict::Refuted, "no solution exists: the witness contradicts the inequalities".into()),
+        (Outcome::Infeasible(witness), _, _) => (
+            Verdict::Undecided,
+            format!(
+                "no solution exists with unknowns up to {} in the units of the balanced problem: the witness contradicts the inequalities",
+                at_least(witness.excluded_radius)
+            ),
+        ),
         (Outcome::Unbounded(_), _, _) => {
-            (Verdict::Undecided, "the objective grows without end: some state costs nothing; give it a positive weight in Q".into())
+            (Verdict::Undecided, "the objective grows without end, as far as the solver sees: some state costs too little; give it a larger weight in Q".into())
         }
     }
 }
 
 /// Why a point of the polytope excludes every design, in words.
 fn unstabilizable(plan: &ProblemPlan, point: &UnstabilizablePoint) -> String {
-    let part = |(k, &w): (usize, &f64)| {
-        let name = plan.states.get(k).cloned().unwrap_or_else(|| format!("x{}", k + 1));
-        let v = point.direction_imaginary.get(k).copied().unwrap_or(0.0);
-        match (w.abs() > 1e-6, v.abs() > 1e-6) {
-            (false, false) => None,
-            (_, false) => Some(format!("{w:.6} {name}")),
-            (_, true) => Some(format!("({w:.6} {v:+.6}i) {name}")),
-        }
-    };
-    let mode: Vec<String> = point.direction.iter().enumerate().filter_map(part).collect();
     let near: Vec<String> = (point.weights.iter().zip(&plan.places))
         .filter(|&(&weight, _)| weight > 1e-3)
         .map(|(weight, place)| format!("{weight:.4} × {place}"))
         .collect();
-    let [re, im] = point.eigenvalue.map(|part| if part.abs() < 1e-9 { 0.0 } else { part });
-    let eigenvalue = if im == 0.0 { format!("{re:.3e}") } else { format!("{re:.3e} ± {:.3e}i", im.abs()) };
-    let which = format!("no input moves the mode {}, which does not decay (λ = {eigenvalue})", mode.join(" + "));
+    let mode = point.mode();
+    let which = format!(
+        "no input moves {}, a mode that does not decay by itself (λ = {})",
+        mode.combination(&plan.states),
+        mode.eigenvalue_words()
+    );
     match plan.scope {
         _ if point.weights.len() == 1 => format!("{which}: no gain stabilises it"),
         _ if near.len() == 1 => {
@@ -451,7 +484,9 @@ fn word(theorem: &Theorem) -> String {
 
 fn witness(design: &PolytopicDesign) -> Option<Vec<NamedMultiplier>> {
     let answer = &design.answer;
-    if let Some(UnstabilizablePoint { weights, direction: w, direction_imaginary: v, .. }) = &design.unstabilizable {
+    if let Some(UnstabilizablePoint { weights, direction: w, direction_imaginary: v, is_proved: true, .. }) =
+        &design.unstabilizable
+    {
         let name =
             |i: usize| if weights.len() == 1 { "stability".into() } else { format!("stability at vertex {}", i + 1) };
         let imaginary = |i: usize| v.get(i).copied().unwrap_or(0.0);
@@ -545,10 +580,14 @@ impl Report {
         }
         line("verdict", format!("{}: {}", self.verdict.word(), self.verdict_reason));
         line("iterations", format!("{} in {:.4} s", self.iterations, self.seconds));
-        if let Some(explanation) = self.explanation.as_ref().filter(|_| self.unstabilizable.is_none()) {
+        if let Some(explanation) = self.explanation.as_ref().filter(|_| !self.has_unstabilizable_point()) {
             text.push_str(&format!("{explanation}\n"));
         }
         text
+    }
+
+    fn has_unstabilizable_point(&self) -> bool {
+        self.unstabilizable.as_ref().is_some_and(|point| point.is_proved)
     }
 
     /// The failure that the status is, if it is one.
@@ -564,7 +603,7 @@ impl Report {
 
     /// What to relax, or which inequalities contradict each other.
     fn relaxation(&self) -> String {
-        if let Some(point) = &self.unstabilizable {
+        if let Some(point) = self.unstabilizable.as_ref().filter(|_| self.has_unstabilizable_point()) {
             if point.weights.iter().filter(|&&weight| weight > 1e-3).count() == 1 {
                 return "; it needs an input there".into();
             }

@@ -124,12 +124,13 @@ fn arcs(fleet: &Fleet) -> Result<Vec<Entry>, Failure> {
             .map_err(|source| Failure::Synthesis { controller: "quadrotor on an arc of yaw".into(), source })
     };
     let circle = solve(&GridModel::of_plant(&*fleet.plant, 8).points)?;
-    let Some(UnstabilizablePoint { direction, residual, .. }) = circle.unstabilizable else {
+    let Some(UnstabilizablePoint { is_proved: true, direction, eigenvalue, .. }) = circle.unstabilizable else {
         return Err(Failure::Defect("the hull of the yaw circle has no point that cannot be stabilised".into()));
     };
-    let tilt = direction[9].hypot(direction[10]);
+    let length = direction.iter().map(|w| w * w).sum::<f64>().sqrt();
+    let tilt = direction[9].hypot(direction[10]) / length;
     let mut entries = vec![
-        entry("Theorems 4.1-4.4, whole circle", "‖wᵀ[A, B]‖ at its centre", residual, 9, Standing::Refuted).because(format!(
+        entry("Theorems 4.1-4.4, whole circle", "λ of the mode that no input moves at its centre", eigenvalue[0], 9, Standing::Refuted).because(format!(
             "Infeasible, as the thesis says, but not because four vertices are conservative: the hull of any points around the circle holds its centre, where no \
              input moves roll and pitch (w has {tilt:.6} of its length in φ and θ)."
         )),

@@ -191,8 +191,8 @@ fn linear_plants() {
         ("A = [[0, 1], [0, 0]]\nB = [[0], [1]]\nC = [[1]]", ["C is 1 × 1", "p × 2"]),
         ("A = [[0, nan], [0, 0]]\nB = [[0], [1]]", ["A has an entry", "not finite"]),
         ("A = [[0, 1], [0, 0]]", ["missing key `B`", "plant"]),
-        ("A = [[1, 0], [0, -1]]\nB = [[0], [1]]", ["not stabilisable", "1.0000 +0.0000i"]),
-        ("A = [[0, 1], [0, 0]]\nB = [[1], [0]]", ["not stabilisable", "0.0000 +0.0000i"]),
+        ("A = [[1, 0], [0, -1]]\nB = [[0], [1]]", ["not stabilisable: no input moves x_1,", "λ = 1)"]),
+        ("A = [[0, 1], [0, 0]]\nB = [[1], [0]]", ["not stabilisable: no input moves x_2,", "λ = 0)"]),
     ] {
         let text = edited(DOUBLE_INTEGRATOR, PLANT, &format!("name = \"linear\"\n{matrices}"));
         refused(text, 2, &[words[0], words[1], "scenario.toml: plant: "]);

@@ -1,6 +1,6 @@
 //! `lpv design PROBLEM.toml`: the shipped problems, the answer for machines, and everything that can be wrong with a file.
 
-use crate::program::{Place, edited};
+use crate::program::{Place, edited, parsed};
 use serde_json::Value;
 use std::fs;
 
@@ -59,13 +59,14 @@ fn infeasible() {
         );
         let place = Place::with(&text);
         let ended = place.lpv("design scenario.toml --json");
-        ended.refuses(3, &["infeasible", "no input moves the mode", "that the polytope holds"]);
+        ended.refuses(3, &["infeasible", "no input moves ", "that the polytope holds"]);
         let answer: Value = serde_json::from_str(&ended.out).unwrap();
         assert_eq!((&answer["status"], &answer["verdict"]), (&"infeasible".into(), &"refuted".into()));
         assert!(answer["K"].is_null() && !answer["explanation"]["carriers"].as_array().unwrap().is_empty());
         assert!(!answer["witness"].as_array().unwrap().is_empty());
         let direction: Vec<f64> = serde_json::from_value(answer["unstabilizable_point"]["direction"].clone()).unwrap();
-        assert!((direction[9].hypot(direction[10]) - 1.0).abs() < 1e-9, "{direction:?}");
+        assert!((0..12).all(|i| matches!(i, 9 | 10) || direction[i] == 0.0), "{direction:?}");
+        assert_eq!(answer["unstabilizable_point"]["proved"], true);
     }
 }
 
@@ -75,9 +76,11 @@ fn a_model_without_stabilising_input() {
     for lyapunov in ["common", "frozen"] {
         let text = edited(DOUBLE_INTEGRATOR, "A = [[0, 1], [0, 0]]", "A = [[1, 0], [0, -1]]");
         let text = edited(&text, "method = \"slqr\"", &format!("method = \"slqr\"\nlyapunov = \"{lyapunov}\""));
-        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "1.000000 x1", "needs an input"]);
+        Place::with(&text)
+            .lpv("design scenario.toml")
+            .refuses(3, &["infeasible", "no input moves x1,", "(λ = 1)", "needs an input"]);
         let text = edited(&text, "A = [[1, 0], [0, -1]]\nB = [[0], [1]]", "A = [[0, 2], [-2, 0]]\nB = [[0], [0]]");
-        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "± 2.000e0i"]);
+        Place::with(&text).lpv("design scenario.toml").refuses(3, &["infeasible", "λ = 0 ± 2i"]);
     }
 }
 
@@ -297,4 +300,63 @@ fn the_commutator_has_its_induced_norm() {
     Place::with(edited(COMMUTATOR, "range = [-1, 1]", "range = [1, -1]"))
         .lpv("design scenario.toml")
         .refuses(2, &["model.range", "ascend"]);
+}
+
+/// A case file of others' trackers, answered.
+fn case(file: &str) -> (Place, String) {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/public").join(file);
+    let text = std::fs::read_to_string(path).unwrap();
+    (Place::with(&text), text)
+}
+
+/// K of the case, its inequalities verified, and the file proved.
+fn regulator(file: &str, expected: &[f64]) {
+    let (place, _) = case(file);
+    let answer = parsed(&place.succeed("design scenario.toml --json"));
+    assert_eq!((&answer["status"], &answer["verdict"]), (&"solved".into(), &"numerical".into()), "{file}");
+    assert!(answer["residuals"].as_object().unwrap().values().all(|margin| margin.as_f64().unwrap() > 0.0), "{answer}");
+    for (j, expected) in expected.iter().enumerate() {
+        let found = answer["K"][0][0][j].as_f64().unwrap();
+        assert!((found / expected - 1.0).abs() < 1e-9, "{file}: {found} {expected}");
+    }
+    place.succeed("design scenario.toml -o design.json");
+    let certificate = parsed(&place.succeed("certify design.json --json"));
+    assert_eq!(certificate["verdict"], "proved", "{file}: {certificate}");
+}
+
+#[test]
+fn regulators_that_the_solver_does_not_reach() {
+    regulator("detectable-q.toml", &[2.0_f64.sqrt() - 1.0, 1.3243932834975, 0.91017972112445]);
+    regulator("weights-1e15.toml", &[31622786.411685, 31622777.601684]);
+    regulator("weights-1e-15.toml", &[19.62, 6.2641839053]);
+    regulator("stabilisable.toml", &[]);
+}
+
+/// Yaw costs nothing, and it stays where it is.
+#[test]
+fn a_motion_that_costs_nothing_is_named() {
+    let (place, text) = case("undetectable-yaw.toml");
+    place
+        .lpv("design scenario.toml")
+        .refuses(3, &["unbounded", "the motion x6 does not decay", "(λ = 0)", "weight in Q"]);
+    // with a weight there is a regulator
+    let start = text.find("Q = [").unwrap();
+    let (before, after) = (&text[..start], &text[start..]);
+    let (_, rest) = after.split_once("R = ").unwrap();
+    let weighed = format!("{before}Q_diag = [10, 10, 10, 0, 0, 1, 0, 0, 0, 0, 0, 0]\nR = {rest}");
+    let answer = parsed(&Place::with(&weighed).succeed("design scenario.toml --json"));
+    assert_eq!(answer["status"], "solved");
+}
+
+/// A coupling of 10⁻³⁰⁰ stabilises, to the letter: that there is no solution is not said.
+#[test]
+fn what_is_stabilisable_is_not_refuted() {
+    for method in ["lqr", "stabilize"] {
+        let weights = if method == "lqr" { "[weights]\nQ_diag = [1, 1]\nR_diag = [1]\n" } else { "" };
+        let text =
+            format!("[model]\nA = [[1, 1e-300], [0, -1]]\nB = [[0], [1]]\n{weights}[design]\nmethod = \"{method}\"\n");
+        let ended = Place::with(&text).lpv("design scenario.toml --json");
+        let answer: Value = serde_json::from_str(&ended.out).unwrap();
+        assert_eq!((&answer["status"], &answer["verdict"]), (&"inaccurate".into(), &"undecided".into()), "{answer}");
+    }
 }

@@ -9,6 +9,7 @@
 //!
 //! What is lost is made good by more bits; where that is bound to fail (an exact tie) nothing is decided.
 
+use super::definite::parts;
 use super::interval::Interval;
 use num_bigint::{BigInt, Sign};
 
@@ -32,16 +33,6 @@ pub struct BallMatrix {
 
 /// Exponents of entries beyond which nothing is computed.
 const MOST_EXPONENT: i64 = 100_000;
-
-/// m and e of x = m 2^e.
-fn parts(x: f64) -> (i64, i64) {
-    let bits = x.to_bits();
-    let exponent = (bits >> 52 & 0x7ff) as i64;
-    let fraction = (bits & 0x000f_ffff_ffff_ffff) as i64;
-    let mantissa = if exponent == 0 { fraction } else { fraction | 1 << 52 };
-    let sign = if bits >> 63 == 1 { -1 } else { 1 };
-    (sign * mantissa, exponent.max(1) - 1075)
-}
 
 /// m 2^e rounded down, and whether that is exact.
 fn shifted(m: BigInt, e: i64) -> (BigInt, bool) {

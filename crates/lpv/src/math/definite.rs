@@ -45,7 +45,7 @@ pub fn definiteness(matrix: &Mat<f64>) -> Option<Definiteness> {
 }
 
 /// m and e of x = m 2^e.
-fn parts(x: f64) -> (i64, i64) {
+pub(super) fn parts(x: f64) -> (i64, i64) {
     let bits = x.to_bits();
     let exponent = (bits >> 52 & 0x7ff) as i64;
     let fraction = (bits & 0x000f_ffff_ffff_ffff) as i64;
@@ -82,7 +82,8 @@ fn parts_exponent(x: f64) -> i64 {
     exponent + 64 - i64::from(mantissa.unsigned_abs().leading_zeros())
 }
 
-fn eliminated(mut m: Vec<Vec<BigInt>>) -> Definiteness {
+/// What the symmetric matrix `m` of integers is.
+pub(super) fn eliminated(mut m: Vec<Vec<BigInt>>) -> Definiteness {
     let zero = BigInt::from(0);
     let n = m.len();
     let mut previous = BigInt::from(1);

@@ -94,35 +94,10 @@ fn nan_max(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
-/// The first eigenvalue λ of A with Re λ ≥ 0 that the input cannot move: rank [A − λI, B] < n
-/// (Popov–Belevitch–Hautus). `None` when (A, B) is stabilisable.
-pub fn unstabilizable_mode(a: &Mat<f64>, b: &Mat<f64>) -> Option<(f64, f64)> {
-    let (n, m) = (a.nrows(), b.ncols());
-    let scale = a.norm_l2().max(b.norm_l2()).max(f64::MIN_POSITIVE);
-    eigenvalues(a).into_iter().find(|&(re, im)| {
-        // eigenvalues of a defective matrix are exact only to the root of the rounding unit
-        let pencil = Mat::from_fn(n, n + m, |i, j| {
-            let entry = if j < n { a[(i, j)] } else { b[(i, j - n)] };
-            if i == j { c64::new(entry - re, -im) } else { c64::new(entry, 0.0) }
-        });
-        re >= -1e-9 * scale
-            && pencil.singular_values().map_or(true, |values| values.last().is_none_or(|&least| least <= 1e-10 * scale))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::matrix::{diagonal, from_rows};
-
-    #[test]
-    fn a_mode_without_input_is_named() {
-        let a = diagonal(&[-1.0, 2.0]);
-        let b = from_rows(&[vec![1.0], vec![0.0]]);
-        assert_eq!(unstabilizable_mode(&a, &b), Some((2.0, 0.0)));
-        let b = from_rows(&[vec![0.0], vec![1.0]]);
-        assert_eq!(unstabilizable_mode(&a, &b), None, "the uncontrolled mode is stable");
-    }
+    use crate::math::matrix::from_rows;
 
     #[test]
     fn rotation_has_imaginary_eigenvalues() {

@@ -36,8 +36,8 @@ pub struct OptimalTrajectory {
 /// Why no optimal trajectory was found.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum OptimalError {
-    /// The linearised problem has no regulator.
-    #[error("the linearised plant has no regulator: {0}")]
+    /// No regulator of the linearised problem was found.
+    #[error("no regulator of the linearised plant was found: {0}")]
     Riccati(#[from] riccati::RiccatiError),
     /// An integration failed.
     #[error(transparent)]

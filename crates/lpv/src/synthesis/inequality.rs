@@ -78,7 +78,7 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
             shares.sort_by(|a, b| b.0.total_cmp(&a.0));
             let carriers =
                 shares.iter().take(3).map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
-            Err(SynthesisError::Infeasible { rho, carriers })
+            Err(SynthesisError::Infeasible { rho, radius: witness.excluded_radius, carriers })
         }
         Outcome::Unbounded(_) => Err(SynthesisError::Unbounded { rho }),
         Outcome::Inaccurate(reason) => Err(SynthesisError::Inaccurate { rho, reason: reason.to_string() }),

@@ -27,20 +27,22 @@ pub fn lqr_by_inequality(
 }
 
 /// Theorem 4.5 at one parameter value. The inequality's optimum is the Riccati solution, which gives the gain; the two
-/// are both computed, and how far their traces differ is kept in the result.
+/// are both computed, and how far their traces differ is kept in the result where the solver reaches it.
 pub(super) fn frozen(model: &FrozenModel, weights: &CostWeights) -> Result<FrozenDesign, SynthesisError> {
-    let (y_inequality, _, iterations) = lqr_by_inequality(model, weights)?;
     let regulator = riccati::solve(&model.a, &model.b, &weights.q, &weights.r)
         .map_err(|source| SynthesisError::Riccati { rho: model.rho, source })?;
-    let y = inverse_spd(&regulator.p).ok_or(SynthesisError::Unbounded { rho: model.rho })?;
+    let reason = || "P of the Riccati equation is not positive definite after rounding".to_owned();
+    let y = inverse_spd(&regulator.p).ok_or_else(|| SynthesisError::Inaccurate { rho: model.rho, reason: reason() })?;
     let trace_y = trace(&y);
+    // the solver may stop short where weights or states differ much in size; the gain does not need it
+    let by_inequality = lqr_by_inequality(model, weights).ok();
     Ok(FrozenDesign {
         rho: model.rho,
         gain: regulator.k,
         auxiliary_gain: None,
         p: regulator.p,
         trace_y,
-        riccati_difference: Some((trace(&y_inequality) / trace_y - 1.0).abs()),
-        iterations,
+        riccati_difference: by_inequality.as_ref().map(|(y, ..)| (trace(y) / trace_y - 1.0).abs()),
+        iterations: by_inequality.map_or(0, |(.., iterations)| iterations),
     })
 }

@@ -42,27 +42,37 @@ pub use region::covering_level;
 pub use supervision::{GovernorOptions, Supervision, SupervisionError, design_supervised, governed_states, governor};
 pub use validation::DesignError;
 
+use crate::math::decimal::at_least;
+
 /// Why there is no design.
 #[derive(Debug, thiserror::Error)]
 pub enum SynthesisError {
     /// The Riccati equation has no stabilising solution.
-    #[error("no regulator exists at parameter {rho:.6}: {source}")]
+    #[error("no regulator was found at parameter {rho:.6}: {source}")]
     Riccati {
         /// Parameter value.
         rho: f64,
         /// The reason.
         source: crate::math::riccati::RiccatiError,
     },
-    /// The inequalities contradict each other.
-    #[error("the inequalities have no solution at parameter {rho:.6}; the contradiction is carried by: {}", carriers.join(", "))]
+    /// The inequalities contradict each other, for unknowns up to a size.
+    #[error(
+        "the inequalities have no solution with unknowns up to {} at parameter {rho:.6}; the contradiction is carried by: {}",
+        at_least(*radius),
+        carriers.join(", ")
+    )]
     Infeasible {
         /// Parameter value.
         rho: f64,
+        /// What is proved: size of the unknowns, in the units of the balanced problem, up to which there is none.
+        radius: f64,
         /// The inequalities with the largest multipliers, largest first, with their share.
         carriers: Vec<String>,
     },
-    /// The objective is not bounded.
-    #[error("tr Y is unbounded at parameter {rho:.6}: some state costs nothing; give it a positive weight in Q")]
+    /// The solver saw no bound of the objective.
+    #[error(
+        "tr Y grows without end at parameter {rho:.6}, as far as the solver sees: some state costs too little; give it a larger weight in Q"
+    )]
     Unbounded {
         /// Parameter value.
         rho: f64,

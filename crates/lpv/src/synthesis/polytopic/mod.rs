@@ -33,11 +33,14 @@ use super::high_gain::Segment;
 use super::{CostWeights, HighGainOptions, SynthesisError};
 use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
-use crate::math::matrix::{inverse_spd, symmetric_part};
+use crate::math::matrix::{inverse_spd, symmetric_part, trace};
+use crate::math::riccati::{self, Regulator, RiccatiError};
+use crate::math::stabilizability::{Mode, Stabilizability, stabilizability};
 use crate::model::{FrozenModel, Polytope};
 use inequality::{DoubleSum, Unknowns, Weights};
-use lmi::{Answer, Carrier, Explanation, Expr, Options, Outcome, Problem};
+use lmi::{Answer, Carrier, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
 use moderation::{COST_LADDER, MARGIN_LADDER, Moderated, Stage};
+use objective::Posed;
 
 /// The Lyapunov function xᵀY(ρ)⁻¹x.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,8 +99,13 @@ pub struct PolytopicDesign {
     pub moderation: Option<Moderation>,
     /// Why there is no solution, where there is none.
     pub explanation: Option<Explanation>,
-    /// A point of the polytope that no input can stabilise: where there is one there is no solution, whatever the solver says.
+    /// A point of the polytope that no input can stabilise, or that only seems so: where it is proved there is no solution, whatever the solver says.
     pub unstabilizable: Option<UnstabilizablePoint>,
+    /// A motion that costs nothing and does not decay, of one vertex, which is proved.
+    pub undetectable: Option<Mode>,
+    /// Where the solver stopped short and the answer's blocks and objective are those of the Riccati solution, made strict by this ε
+    /// ([`crate::math::riccati::strict`]): they are proved at it, and it is the solution.
+    pub riccati: Option<f64>,
     /// Y, L and gains where the problem was solved, and at the best point so far where the solver stopped short.
     pub solution: Option<Solution>,
 }
@@ -105,26 +113,47 @@ pub struct PolytopicDesign {
 impl PolytopicDesign {
     /// Whether Y and L satisfy every inequality, with a proved margin: at the optimum, or with a part of it given back.
     pub fn is_solved(&self) -> bool {
-        self.solution.is_some() && (self.moderation.is_some() || matches!(self.answer.outcome, Outcome::Solved))
+        let is_proved = self.moderation.is_some() || self.riccati.is_some();
+        self.solution.is_some() && (is_proved || matches!(self.answer.outcome, Outcome::Solved))
     }
 
     /// The optimum of what was asked for, whatever was given back of it.
     pub fn optimum(&self) -> f64 {
-        match &self.moderation {
-            // least cost bounds are posed as their negative
-            Some(moderation) => moderation.optimum.abs(),
-            None => self.answer.objective,
-        }
+        self.moderation.as_ref().map_or(self.answer.objective, |moderation| moderation.optimum)
     }
 
     /// What the design that is returned has of it.
     pub fn achieved(&self) -> f64 {
-        self.moderation.as_ref().map_or(self.answer.objective, |moderation| moderation.achieved.abs())
+        self.moderation.as_ref().map_or(self.answer.objective, |moderation| moderation.achieved)
     }
 
-    /// Whether it is refuted, by the solver's witness or by a point that cannot be stabilised.
+    /// Whether it is refuted, by the solver's witness or by a point that is proved not to be stabilisable.
     pub fn is_infeasible(&self) -> bool {
-        self.unstabilizable.is_some() || matches!(self.answer.outcome, Outcome::Infeasible(_))
+        self.unstabilizable.as_ref().is_some_and(|point| point.is_proved)
+            || matches!(self.answer.outcome, Outcome::Infeasible(_))
+    }
+
+    fn without_solution(answer: Answer) -> Self {
+        Self {
+            answer,
+            moderation: None,
+            explanation: None,
+            unstabilizable: None,
+            undetectable: None,
+            riccati: None,
+            solution: None,
+        }
+    }
+
+    /// A witness of the solver excludes solutions up to a size. Of one vertex that is stabilisable it is known that there are larger ones.
+    fn withdraw_infeasible(&mut self, polytope: &Polytope) {
+        if matches!(self.answer.outcome, Outcome::Infeasible(_))
+            && polytope.len() == 1
+            && stabilizability(polytope.a(0), polytope.b(0)) == Stabilizability::Stabilizable
+        {
+            self.answer.outcome = Outcome::Inaccurate(InaccurateReason::NotVerified);
+            self.explanation = None;
+        }
     }
 }
 
@@ -212,7 +241,8 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
         let identity = Mat::identity(polytope.inputs(), polytope.inputs());
         let stage = Stage {
             problem: &problem,
-            objective: &t,
+            objective: &Posed { value: t.clone(), is_maximised: true },
+            least: LEAST_MARGIN,
             l: &unknowns.l,
             y: &unknowns.y,
             r_inverse: &identity,
@@ -225,23 +255,22 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
         return moderated(answer);
     }
     // the scale allows t = 0 always: what there is nothing above for is said by a point, or by the strict problem's witness
-    if rests(&request.lyapunov)
-        && let Some(point) =
-            unstabilizable::vertex(polytope).or_else(|| unstabilizable::point(polytope, &terms, &answer.multipliers))
-    {
-        let explanation = Explanation { distance: 0.0, carriers: carriers(&point) };
-        return Ok(PolytopicDesign {
-            answer,
-            moderation: None,
-            explanation: Some(explanation),
-            unstabilizable: Some(point),
-            solution: None,
-        });
+    let point = (rests(&request.lyapunov).then(|| {
+        unstabilizable::vertex(polytope).or_else(|| unstabilizable::point(polytope, &terms, &answer.multipliers))
+    }))
+    .flatten();
+    if let Some(point) = point.as_ref().filter(|point| point.is_proved) {
+        let explanation = Explanation { distance: 0.0, carriers: carriers(point) };
+        let refuted = PolytopicDesign::without_solution(answer);
+        return Ok(PolytopicDesign { explanation: Some(explanation), unstabilizable: Some(point.clone()), ..refuted });
     }
-    match solved {
-        true => stabilize_strictly(polytope, request),
-        false => moderated(answer),
-    }
+    let mut design = match solved {
+        true => stabilize_strictly(polytope, request)?,
+        false => moderated(answer)?,
+    };
+    design.withdraw_infeasible(polytope);
+    design.unstabilizable = point;
+    Ok(design)
 }
 
 /// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean tells.
@@ -330,24 +359,46 @@ fn regulate(
     }
     let objective = request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
     let answer = problem.solve(&solver())?;
+    let mut seems_unstabilizable = None;
     if matches!(answer.outcome, Outcome::Inaccurate(_) | Outcome::Infeasible(_)) {
         let stabilization = stabilize(polytope, request)?;
         if stabilization.is_infeasible() {
             return Ok(stabilization);
+        }
+        seems_unstabilizable = stabilization.unstabilizable;
+    }
+    let is_riccati =
+        polytope.len() == 1 && request.saturation.is_none() && matches!(request.objective, Objective::Trace);
+    let mut undetectable = None;
+    if is_riccati && !matches!(answer.outcome, Outcome::Solved) {
+        match riccati::solve(polytope.a(0), polytope.b(0), &cost.q, &cost.r) {
+            Ok(regulator) => {
+                if let Some(design) = by_riccati(polytope, cost, &problem, &answer, &regulator)? {
+                    return Ok(design);
+                }
+            }
+            Err(RiccatiError::Unweighted(mode)) => undetectable = Some(mode),
+            Err(_) => {}
         }
     }
     let low_l: Vec<Expr> = auxiliary.clone().unwrap_or_else(|| unknowns.l.clone());
     let stage = Stage {
         problem: &problem,
         objective: &objective,
+        least: f64::NEG_INFINITY,
         l: &low_l,
         y: &unknowns.y,
         r_inverse: &weights.r_inverse,
         ladder: &COST_LADDER,
     };
-    let moderated = stage.moderate(answer, request.back_off, &solver())?;
+    // the optimum of one vertex without limits is the Riccati solution, which is attained
+    let is_attained = is_riccati && matches!(answer.outcome, Outcome::Solved);
+    let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
+    let moderated = stage.moderate(answer, back_off, &solver())?;
     let shrink = moderated.shrink;
     let mut design = finish(&problem, moderated, &unknowns, auxiliary.as_deref())?;
+    design.withdraw_infeasible(polytope);
+    (design.undetectable, design.unstabilizable) = (undetectable, seems_unstabilizable);
     let (Some(solution), Some(high_gain)) = (&mut design.solution, request.high_gain) else { return Ok(design) };
     let low = solution.auxiliary_gain.take().unwrap_or_else(|| solution.gain.clone());
     let mut s = choose(polytope, cost, &solution.p, &low, &high_gain)?;
@@ -382,6 +433,47 @@ fn regulate(
         .map(|(name, block)| (name, smallest_eigenvalue(&design.answer.value(&block))))
         .collect();
     Ok(design)
+}
+
+/// What is added to a solution of the Riccati equation, relatively, smallest first.
+const STRICT: [f64; 7] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+
+/// Theorem 2.1 by the Riccati equation, where the solver stopped short of its optimum: the P of least ε that is proved to satisfy the
+/// inequalities of `problem`. With an unobserved motion that decays the optimum is not attained; the gain is that of the optimum all the same.
+fn by_riccati(
+    polytope: &Polytope,
+    cost: &CostWeights,
+    problem: &Problem,
+    answer: &Answer,
+    regulator: &Regulator,
+) -> Result<Option<PolytopicDesign>, SynthesisError> {
+    let (a, b) = (polytope.a(0), polytope.b(0));
+    for epsilon in STRICT {
+        let Some(p) = riccati::strict((a, b), (&cost.q, &cost.r), regulator, epsilon) else { continue };
+        let Some(y) = inverse_spd(&p) else { continue };
+        let l = &regulator.k * &y;
+        let blocks = problem.verify(&[y.clone(), l.clone()])?;
+        if !blocks.iter().all(|block| block.verified_lower_bound > 0.0) {
+            continue;
+        }
+        let mut answer = answer.clone();
+        (answer.objective, answer.blocks) = (trace(&y), blocks);
+        let solution = Solution {
+            y: vec![y],
+            l: vec![l],
+            p: vec![p],
+            gain: vec![regulator.k.clone()],
+            auxiliary_gain: None,
+            s: None,
+            mixtures: Vec::new(),
+        };
+        return Ok(Some(PolytopicDesign {
+            riccati: Some(epsilon),
+            solution: Some(solution),
+            ..PolytopicDesign::without_solution(answer)
+        }));
+    }
+    Ok(None)
 }
 
 /// The least s of all vertices, each by the rule of [`Segment`].
@@ -444,5 +536,5 @@ fn finish(
         }
         Outcome::Infeasible(_) | Outcome::Unbounded(_) => None,
     };
-    Ok(PolytopicDesign { answer, moderation, explanation, unstabilizable: None, solution })
+    Ok(PolytopicDesign { moderation, explanation, solution, ..PolytopicDesign::without_solution(answer) })
 }

@@ -5,7 +5,7 @@
 //! back, the design whose input is smallest on its own ellipsoid:
 //!
 //! ```text
-//! minimise τ   subject to   the inequalities of the design,   f ≥ f* − β|f*|,
+//! minimise τ   subject to   the inequalities of the design,   f ≥ f* − β|f*|   (t ≤ t* + β|t*| of a cost bound t),
 //!
 //! ⎡ τ R⁻¹  Lᵢ ⎤ ⪰ 0 at every vertex:   uᵀRu ≤ τ on {x: V ≤ 1} for u = −K(ρ)x.
 //! ⎣ Lᵢᵀ    Yᵢ ⎦
@@ -18,6 +18,7 @@
 //! W(P) = P(A − BK) + (A − BK)ᵀP + Q + KᵀRK ⪯ 0, W((1 + ε)P) = (1 + ε)W(P) − ε(Q + KᵀRK), and |kx| ≤ σ on V ≤ γ becomes strict, which
 //! pays for the rounding of K and P.
 
+use super::objective::Posed;
 use crate::math::Mat;
 use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::matrix::{inverse_spd, semidefinite_factor};
@@ -67,8 +68,10 @@ const STRICTNESS: f64 = 1e-6;
 pub(super) struct Stage<'a> {
     /// The inequalities, with the optimum's objective.
     pub problem: &'a Problem,
-    /// f, to be as large as possible.
-    pub objective: &'a Expr,
+    /// f
+    pub objective: &'a Posed,
+    /// f* has to be more than this, for there to be something to give back.
+    pub least: f64,
     /// Lᵢ of the gain that is to be small.
     pub l: &'a [Expr],
     /// Yᵢ
@@ -110,8 +113,8 @@ impl Stage<'_> {
     pub fn moderate(&self, answer: Answer, back_off: BackOff, options: &Options) -> Result<Moderated, Error> {
         let is_attained = matches!(answer.outcome, Outcome::Solved);
         let is_a_start = is_attained || matches!(answer.outcome, Outcome::Inaccurate(_));
-        let optimum = answer.value(self.objective)[(0, 0)];
-        if back_off == BackOff::Nothing || !is_a_start || !optimum.is_finite() {
+        let optimum = answer.value(&self.objective.value)[(0, 0)];
+        if back_off == BackOff::Nothing || !is_a_start || !optimum.is_finite() || optimum <= self.least {
             return Ok(answer.into());
         }
         let ladder = match back_off {
@@ -125,7 +128,7 @@ impl Stage<'_> {
             back_off,
             optimum,
             is_attained,
-            achieved: design.value(self.objective)[(0, 0)] / shrink.powf(optimum.signum()),
+            achieved: design.value(&self.objective.value)[(0, 0)] / shrink.powf(self.objective.sign()),
             effort_at_optimum,
             effort: self.effort(design, &most),
         };
@@ -154,8 +157,9 @@ impl Stage<'_> {
     fn second(&self, optimum: f64, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
         let mut problem = self.problem.clone();
         let tau = problem.scalar("effort");
-        let least = Expr::constant(Mat::from_fn(1, 1, |_, _| optimum - share * optimum.abs()));
-        problem.positive_definite_by("what is left of the optimum", self.objective - least, 0.0);
+        let sign = self.objective.sign();
+        let least = Expr::constant(Mat::from_fn(1, 1, |_, _| sign * optimum - share * optimum.abs()));
+        problem.positive_definite_by("what is left of the optimum", sign * &self.objective.value - least, 0.0);
         for (i, (l, y)) in self.l.iter().zip(self.y).enumerate() {
             let block = Expr::symmetric_blocks(vec![vec![tau.times(self.r_inverse)], vec![l.t(), y.clone()]]);
             problem.positive_definite_by(format!("effort at vertex {}", i + 1), block, 0.0);

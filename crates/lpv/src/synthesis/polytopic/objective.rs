@@ -23,15 +23,30 @@ pub enum Objective {
     },
 }
 
+/// An objective of a problem.
+pub(super) struct Posed {
+    /// A scalar.
+    pub value: Expr,
+    /// As large as possible, or as small.
+    pub is_maximised: bool,
+}
+
+impl Posed {
+    /// 1, or −1: times this it is to be as large as possible.
+    pub fn sign(&self) -> f64 {
+        if self.is_maximised { 1.0 } else { -1.0 }
+    }
+}
+
 impl Objective {
-    /// Pose it for the Yᵢ: `distinct` without repetition, `vertices` one for each vertex. Returned is what is to be as large as
-    /// possible: the trace, or −t.
-    pub(super) fn pose(&self, problem: &mut Problem, distinct: &[&Expr], vertices: &[Expr]) -> Expr {
+    /// Pose it for the Yᵢ: `distinct` without repetition, `vertices` one for each vertex. Returned is what was posed: the trace,
+    /// or t.
+    pub(super) fn pose(&self, problem: &mut Problem, distinct: &[&Expr], vertices: &[Expr]) -> Posed {
         match self {
             Objective::Trace => {
                 let trace = distinct.iter().fold(Expr::zeros(1, 1), |sum, y| sum + y.trace());
                 problem.maximize(&trace);
-                trace
+                Posed { value: trace, is_maximised: true }
             }
             Objective::States { states, parameter } => {
                 let n = vertices[0].nrows();
@@ -52,7 +67,7 @@ impl Objective {
                     }
                 }
                 problem.minimize(&t);
-                -1.0 * t
+                Posed { value: t, is_maximised: false }
             }
             Objective::Ellipsoid { shape } => {
                 let n = vertices[0].nrows();
@@ -64,7 +79,7 @@ impl Objective {
                         .positive_definite(format!("cost bound of the ellipsoid{}", vertex(i, distinct.len())), block);
                 }
                 problem.minimize(&t);
-                -1.0 * t
+                Posed { value: t, is_maximised: false }
             }
         }
     }
