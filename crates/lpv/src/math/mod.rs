@@ -20,6 +20,7 @@ mod residue;
 pub mod riccati;
 pub mod scalar;
 pub mod schur_cohn;
+pub mod separation;
 pub mod stabilizability;
 pub mod stein;
 pub mod taylor;

@@ -20,12 +20,14 @@ mod inequality;
 mod moderation;
 mod objective;
 mod rates;
+mod separation;
 mod theorem;
 mod unstabilizable;
 
 pub use moderation::{BackOff, Moderation};
 pub use objective::Objective;
 pub use rates::rate_box_vertices;
+pub use separation::Separation;
 pub use theorem::Theorem;
 pub use unstabilizable::UnstabilizablePoint;
 
@@ -101,6 +103,8 @@ pub struct PolytopicDesign {
     pub explanation: Option<Explanation>,
     /// A point of the polytope that no input can stabilise, or that only seems so: where it is proved there is no solution, whatever the solver says.
     pub unstabilizable: Option<UnstabilizablePoint>,
+    /// Proof that the vertices have no common Lyapunov function.
+    pub separation: Option<Separation>,
     /// A motion that costs nothing and does not decay, of one vertex, which is proved.
     pub undetectable: Option<Mode>,
     /// Where the solver stopped short and the answer's blocks and objective are those of the Riccati solution, made strict by this ε
@@ -129,7 +133,8 @@ impl PolytopicDesign {
 
     /// Whether it is refuted, by the solver's witness or by a point that is proved not to be stabilisable.
     pub fn is_infeasible(&self) -> bool {
-        self.unstabilizable.as_ref().is_some_and(|point| point.is_proved)
+        self.separation.is_some()
+            || self.unstabilizable.as_ref().is_some_and(|point| point.is_proved)
             || matches!(self.answer.outcome, Outcome::Infeasible(_))
     }
 
@@ -139,6 +144,7 @@ impl PolytopicDesign {
             moderation: None,
             explanation: None,
             unstabilizable: None,
+            separation: None,
             undetectable: None,
             riccati: None,
             solution: None,
@@ -252,7 +258,10 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
         finish(&problem, moderated, &unknowns, None)
     };
     if solved && answer.objective > LEAST_MARGIN {
-        return moderated(answer);
+        let design = moderated(answer.clone())?;
+        if design.moderation.is_some() || request.back_off == BackOff::Nothing {
+            return Ok(design);
+        }
     }
     // the scale allows t = 0 always: what there is nothing above for is said by a point, or by the strict problem's witness
     let point = (rests(&request.lyapunov).then(|| {
@@ -263,6 +272,13 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
         let explanation = Explanation { distance: 0.0, carriers: carriers(point) };
         let refuted = PolytopicDesign::without_solution(answer);
         return Ok(PolytopicDesign { explanation: Some(explanation), unstabilizable: Some(point.clone()), ..refuted });
+    }
+    if request.lyapunov == Lyapunov::Common
+        && let Some(separation) = Separation::of(polytope)
+    {
+        let explanation = Explanation { distance: 0.0, carriers: separation.carriers() };
+        let refuted = PolytopicDesign::without_solution(answer);
+        return Ok(PolytopicDesign { explanation: Some(explanation), separation: Some(separation), ..refuted });
     }
     let mut design = match solved {
         true => stabilize_strictly(polytope, request)?,
