@@ -252,6 +252,7 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
             l: &unknowns.l,
             y: &unknowns.y,
             r_inverse: &identity,
+            q: None,
             ladder: &MARGIN_LADDER,
         };
         let moderated = stage.moderate(answer, request.back_off, &solver())?;
@@ -405,6 +406,7 @@ fn regulate(
         l: &low_l,
         y: &unknowns.y,
         r_inverse: &weights.r_inverse,
+        q: inverse_spd(&cost.q).map(|_| &cost.q),
         ladder: &COST_LADDER,
     };
     // the optimum of one vertex without limits is the Riccati solution, which is attained

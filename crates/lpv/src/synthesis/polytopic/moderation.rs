@@ -11,7 +11,8 @@
 //! ⎣ Lᵢᵀ    Yᵢ ⎦
 //! ```
 //!
-//! Both sides are quadratic in x, so that the measure has no unit of its own: it is the same for every scale of states, inputs and
+//! uᵀRu ≤ τV and V ≤ ν xᵀQx, so that τν bounds the gain itself, uᵀRu/xᵀQx; where that is large, the least ν is taken with a little more than
+//! the least τ: P ⪯ νQ. Both sides are quadratic in x, so that the measure has no unit of its own: it is the same for every scale of states, inputs and
 //! time. Of a high gain it is the low gain F that is kept small; K is then the chosen share of the way to R⁻¹BᵀP.
 //!
 //! At its optimum the second problem rests on its boundary as the first does. What is returned is (Y, L)/(1 + ε): for
@@ -61,6 +62,10 @@ pub(super) const COST_LADDER: [f64; 4] = [1e-3, 1e-2, 5e-2, 1e-1];
 pub(super) const MARGIN_LADDER: [f64; 3] = [1e-2, 1e-1, 5e-1];
 /// The knee: the effort is at most this many times that of the largest share.
 const KNEE: f64 = 2.0;
+/// √(uᵀRu/xᵀQx) from which a gain counts as large: then, with some room for the effort, V is kept small relative to the running cost.
+const LARGE_GAIN: f64 = 1e3;
+/// How much more than the least τ may then be taken.
+const EFFORT_ROOM: f64 = 4.0;
 /// ε of the strictness that is paid for rounding.
 const STRICTNESS: f64 = 1e-6;
 
@@ -78,6 +83,8 @@ pub(super) struct Stage<'a> {
     pub y: &'a [Expr],
     /// R⁻¹ ≻ 0
     pub r_inverse: &'a Mat<f64>,
+    /// Q, where there is one and it is definite.
+    pub q: Option<&'a Mat<f64>>,
     /// The shares that are tried, ascending.
     pub ladder: &'a [f64],
 }
@@ -155,10 +162,11 @@ impl Stage<'_> {
 
     /// The design of least effort with the share `share` of `optimum` given back; `None` where the solver does not find it.
     fn second(&self, optimum: f64, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
+        let one = |value: f64| Expr::constant(Mat::from_fn(1, 1, |_, _| value));
         let mut problem = self.problem.clone();
         let tau = problem.scalar("effort");
         let sign = self.objective.sign();
-        let least = Expr::constant(Mat::from_fn(1, 1, |_, _| sign * optimum - share * optimum.abs()));
+        let least = one(sign * optimum - share * optimum.abs());
         problem.positive_definite_by("what is left of the optimum", sign * &self.objective.value - least, 0.0);
         for (i, (l, y)) in self.l.iter().zip(self.y).enumerate() {
             let block = Expr::symmetric_blocks(vec![vec![tau.times(self.r_inverse)], vec![l.t(), y.clone()]]);
@@ -166,8 +174,31 @@ impl Stage<'_> {
         }
         problem.minimize(&tau);
         let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
-        let answer = problem.solve(&options)?;
-        Ok(is_feasible(&answer).then_some(answer))
+        let least_effort = Some(problem.solve(&options)?).filter(is_feasible);
+        let (Some(q), Some(answer)) = (self.q, &least_effort) else { return Ok(least_effort) };
+        let effort = answer.value(&tau)[(0, 0)];
+        if effort * self.condition(answer, q) <= LARGE_GAIN.powi(2) {
+            return Ok(least_effort);
+        }
+        let nu = problem.scalar("condition");
+        problem.positive_definite_by("what is left of the effort", one(EFFORT_ROOM * effort) - &tau, 0.0);
+        for (i, y) in self.y.iter().enumerate() {
+            let block = Expr::symmetric_blocks(vec![vec![nu.times(q)], vec![Expr::identity(q.nrows()), y.clone()]]);
+            problem.positive_definite_by(format!("condition at vertex {}", i + 1), block, 0.0);
+        }
+        problem.minimize(&nu);
+        let conditioned = Some(problem.solve(&options)?).filter(is_feasible);
+        Ok(conditioned.or(least_effort))
+    }
+
+    /// The least ν with P ⪯ νQ at every vertex, Q ≻ 0.
+    fn condition(&self, design: &Answer, q: &Mat<f64>) -> f64 {
+        let Some(root) = inverse_spd(q).and_then(|inverse| semidefinite_factor(&inverse)) else { return f64::INFINITY };
+        let at = |y: &Expr| {
+            let p = inverse_spd(&design.value(y))?;
+            symmetric_eigenvalues(&(root.transpose() * p * &root)).last().copied()
+        };
+        self.y.iter().map(|y| at(y).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
     }
 
     /// The largest √(uᵀRu) of u = −Kx over the vertices on the ellipsoid {V ≤ 1} of `measure`: √λ_max(R^½ K Y Kᵀ R^½) with
