@@ -3,17 +3,22 @@
 
 mod file;
 pub mod gain;
+mod model;
+mod objective;
 mod solve;
+mod verdict;
 
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::{file as scenario_file, weights};
-use file::{DesignTable, LyapunovName, Matrices, MethodName, ModelTable, ObjectiveName, ProblemFile};
+use file::{DesignTable, LyapunovName, MethodName, ModelTable, ObjectiveName, ProblemFile};
 use lpv::math::Mat;
-use lpv::math::matrix::{from_rows, inverse_spd, is_symmetric};
-use lpv::model::{FrozenModel, GridModel, Polytope, linearize};
+use lpv::math::matrix::from_rows;
+use lpv::model::FrozenModel;
 use lpv::synthesis::polytopic::{BackOff, HighGain, InputBounds, Lyapunov, Objective, rate_box_vertices};
 use lpv::synthesis::{CostWeights, HighGainOptions};
+use model::models;
+use objective::{initial, objective};
 pub use solve::solve;
 use std::path::Path;
 
@@ -166,15 +171,6 @@ impl ProblemPlan {
     }
 }
 
-/// The models of a file, before it is known what for.
-struct Source {
-    models: Vec<FrozenModel>,
-    places: Vec<String>,
-    /// Of matrices: the polytope, of which the models may be points.
-    polytope: Option<Polytope>,
-    plant: Option<Box<dyn lpv::plant::Plant>>,
-}
-
 fn lyapunov(door: &Door, design: &DesignTable, model: &ModelTable, has_plant: bool) -> Result<LyapunovName, Failure> {
     let is_plant = has_plant || model.plant.is_some();
     let lyapunov = design.lyapunov.unwrap_or(if is_plant { LyapunovName::Frozen } else { LyapunovName::Common });
@@ -188,108 +184,6 @@ fn lyapunov(door: &Door, design: &DesignTable, model: &ModelTable, has_plant: bo
         return door.refuse("model.grid", "belongs to lyapunov = \"frozen\" only");
     }
     Ok(lyapunov)
-}
-
-fn models(
-    door: &Door,
-    model: ModelTable,
-    plant: Option<toml::Table>,
-    lyapunov: LyapunovName,
-) -> Result<Source, Failure> {
-    let table = match (plant, &model.plant) {
-        (Some(_), Some(_)) => return door.refuse("model.plant", "and the table [plant] are both given; keep one"),
-        (Some(table), None) => Some(table),
-        (None, Some(name)) => Some(toml::Table::from_iter([("name".to_owned(), toml::Value::String(name.clone()))])),
-        (None, None) => None,
-    };
-    match (table, model.a.is_some() || model.b.is_some()) {
-        (Some(_), true) => door.refuse("model", "has matrices and a plant; keep one"),
-        (None, false) => door.refuse("model", "is empty: give the matrices A and B, or plant = \"…\""),
-        (Some(table), false) => plant_models(door, model, table),
-        (None, true) => matrix_models(door, model, lyapunov),
-    }
-}
-
-fn matrix_models(door: &Door, model: ModelTable, lyapunov: LyapunovName) -> Result<Source, Failure> {
-    for (key, given) in [("grid_points", model.grid_points.is_some()), ("range", model.range.is_some())] {
-        if given {
-            return door.refuse(format!("model.{key}"), "belongs to a plant; a model of matrices has its vertices");
-        }
-    }
-    let matrices = |key: &str, given: Option<Matrices>| -> Result<Vec<Mat<f64>>, Failure> {
-        let each = match given {
-            None => {
-                return door
-                    .refuse(format!("model.{key}"), "is missing: give it as rows, or a list of such for the vertices");
-            }
-            Some(Matrices::One(rows)) => vec![rows],
-            Some(Matrices::Each(each)) => each,
-        };
-        each.iter().enumerate().map(|(i, rows)| matrix(door, &format!("model.{key}[{}]", i + 1), rows)).collect()
-    };
-    let (a, b) = (matrices("A", model.a)?, matrices("B", model.b)?);
-    let polytope = Polytope::new(a, b).or_else(|error| door.refuse("model", error.to_string()))?;
-    let count = polytope.len();
-    let (models, places) = match (&model.grid, lyapunov) {
-        (Some(grid), LyapunovName::Frozen) => {
-            if grid.is_empty() {
-                return door.refuse("model.grid", "is empty: give at least one list of weights");
-            }
-            for (k, weights) in grid.iter().enumerate() {
-                convex_weights(door, &format!("model.grid[{}]", k + 1), weights, count)?;
-            }
-            let place = |weights: &Vec<f64>| format!("rho = {weights:?}");
-            (grid.iter().map(|weights| polytope.at(weights)).collect(), grid.iter().map(place).collect())
-        }
-        _ => {
-            let place = |i: usize| if count == 1 { "the operating point".into() } else { format!("vertex {}", i + 1) };
-            ((0..count).map(|i| polytope.vertex(i)).collect::<Vec<_>>(), (0..count).map(place).collect::<Vec<_>>())
-        }
-    };
-    Ok(Source { models, places, polytope: Some(polytope), plant: None })
-}
-
-fn plant_models(door: &Door, model: ModelTable, table: toml::Table) -> Result<Source, Failure> {
-    let spec = scenario_file::plant(door, table)?;
-    let plant = spec.build().or_else(|error| door.refuse("plant", error.to_string()))?;
-    let scheduling = plant.description().scheduling.clone();
-    let Some(scheduling) = scheduling else {
-        for (key, given) in [("grid_points", model.grid_points.is_some()), ("range", model.range.is_some())] {
-            if given {
-                return door.refuse(format!("model.{key}"), "the plant has no scheduling parameter; remove it");
-            }
-        }
-        let models = vec![linearize(&*plant, 0.0)];
-        return Ok(Source { models, places: vec!["the operating point".into()], polytope: None, plant: Some(plant) });
-    };
-    let count = model.grid_points.unwrap_or(8);
-    if !(2..=512).contains(&count) {
-        return door.refuse("model.grid_points", format!("is {count}: allowed are 2 to 512"));
-    }
-    let models = match model.range.as_deref() {
-        None => GridModel::of_plant(&*plant, count).points,
-        Some(&[low, high]) => {
-            let [least, most] = scheduling.range;
-            let inside =
-                low < high && (scheduling.periodic || (low >= least && high <= most)) && high - low <= most - least;
-            if !(low.is_finite() && high.is_finite() && inside) {
-                return door.refuse(
-                    "model.range",
-                    format!(
-                        "is [{low}, {high}]: it has to ascend and lie in the range of {}, [{least}, {most}]",
-                        scheduling.parameter
-                    ),
-                );
-            }
-            (0..count).map(|k| linearize(&*plant, low + (high - low) * k as f64 / (count - 1) as f64)).collect()
-        }
-        Some(other) => {
-            return door
-                .refuse("model.range", format!("has {} numbers: it has two, the least and the largest", other.len()));
-        }
-    };
-    let places = models.iter().map(|model| format!("{} = {:.6}", scheduling.parameter, model.rho)).collect();
-    Ok(Source { models, places, polytope: None, plant: Some(plant) })
 }
 
 /// A matrix of finite numbers from its rows.
@@ -416,76 +310,18 @@ fn back_off(door: &Door, share: Option<f64>) -> Result<BackOff, Failure> {
     }
 }
 
-fn objective(door: &Door, design: &DesignTable, n: usize, saturated: bool) -> Result<(Objective, bool), Failure> {
-    let name = design.objective;
-    if design.method == MethodName::Stabilize && name != ObjectiveName::Trace {
-        return door.refuse("design.objective", "method \"stabilize\" has its own: the largest margin; remove it");
-    }
-    for (key, given, belongs) in [
-        ("initial_states", design.initial_states.is_some(), ObjectiveName::WorstCase),
-        ("ellipsoid", design.ellipsoid.is_some(), ObjectiveName::WorstCase),
-        ("directions", design.directions.is_some(), ObjectiveName::Region),
-    ] {
-        if given && name != belongs {
-            let belongs = if belongs == ObjectiveName::Region { "region" } else { "worst-case" };
-            return door.refuse(format!("design.{key}"), format!("belongs to objective = \"{belongs}\""));
-        }
-    }
-    let checked = |key: &str, states: &Vec<Vec<f64>>| -> Result<Objective, Failure> {
-        if states.is_empty() {
-            return door.refuse(format!("design.{key}"), "is empty: give at least one state");
-        }
-        for (k, x) in states.iter().enumerate() {
-            state(door, &format!("design.{key}[{}]", k + 1), x, n)?;
-            if x.iter().all(|&value| value == 0.0) {
-                return door
-                    .refuse(format!("design.{key}[{}]", k + 1), "is zero: its bound is zero whatever the design");
-            }
-        }
-        Ok(Objective::States { states: states.clone(), parameter: None })
-    };
-    match name {
-        ObjectiveName::Trace => Ok((Objective::Trace, false)),
-        ObjectiveName::InitialState => match &design.initial_state {
-            None => door.refuse("design.initial_state", "is missing: objective = \"initial-state\" is its cost bound"),
-            Some(x) => Ok((checked("initial_state", &vec![x.clone()])?, false)),
-        },
-        ObjectiveName::WorstCase => match (&design.initial_states, &design.ellipsoid) {
-            (Some(_), Some(_)) => door.refuse("design.ellipsoid", "and initial_states are both given; keep one"),
-            (None, None) => door.refuse(
-                "design.initial_states",
-                "is missing: objective = \"worst-case\" needs initial_states or ellipsoid",
-            ),
-            (Some(states), None) => Ok((checked("initial_states", states)?, false)),
-            (None, Some(rows)) => {
-                let shape = matrix(door, "design.ellipsoid", rows)?;
-                if (shape.nrows(), shape.ncols()) != (n, n)
-                    || !is_symmetric(&shape, 1e-12)
-                    || inverse_spd(&shape).is_none()
-                {
-                    let message =
-                        format!("has to be a symmetric positive definite {n} × {n} matrix S: the states xᵀSx ≤ 1");
-                    return door.refuse("design.ellipsoid", message);
-                }
-                Ok((Objective::Ellipsoid { shape }, false))
-            }
-        },
-        ObjectiveName::Region => match &design.directions {
-            _ if !saturated => door.refuse(
-                "design.objective",
-                "\"region\" is for the methods \"slqr\" and \"slpvqr\": without saturation everything is certified",
-            ),
-            None => door.refuse("design.directions", "is missing: objective = \"region\" is the reach along them"),
-            Some(states) => Ok((checked("directions", states)?, true)),
-        },
-    }
-}
-
 fn state(door: &Door, key: &str, x: &[f64], n: usize) -> Result<(), Failure> {
     if x.len() != n {
         return door.refuse(key, format!("has {} numbers: the model has {n} states", x.len()));
     }
     x.iter().try_for_each(|&value| door.finite(key, value).map(|_| ()))
+}
+
+fn state_like(door: &Door, key: &str, values: &[f64], count: usize) -> Result<(), Failure> {
+    if values.len() != count {
+        return door.refuse(key, format!("has {} numbers: the model has {count} vertices", values.len()));
+    }
+    values.iter().try_for_each(|&value| door.finite(key, value).map(|_| ()))
 }
 
 fn rate_vertices(door: &Door, design: &DesignTable, count: usize) -> Result<Vec<Vec<f64>>, Failure> {
@@ -525,78 +361,4 @@ fn rate_vertices(door: &Door, design: &DesignTable, count: usize) -> Result<Vec<
             Ok(vertices.clone())
         }
     }
-}
-
-fn state_like(door: &Door, key: &str, values: &[f64], count: usize) -> Result<(), Failure> {
-    if values.len() != count {
-        return door.refuse(key, format!("has {} numbers: the model has {count} vertices", values.len()));
-    }
-    values.iter().try_for_each(|&value| door.finite(key, value).map(|_| ()))
-}
-
-/// Convex weights of the ascending `grid` at `rho`, of its two neighbours; `None` outside.
-fn weights_between(grid: &[f64], rho: f64) -> Option<Vec<f64>> {
-    let right = (1..grid.len()).find(|&k| grid[k - 1] <= rho && rho <= grid[k])?;
-    let share = (rho - grid[right - 1]) / (grid[right] - grid[right - 1]);
-    let weight = |k: usize| match k {
-        _ if k == right => share,
-        _ if k + 1 == right => 1.0 - share,
-        _ => 0.0,
-    };
-    Some((0..grid.len()).map(weight).collect())
-}
-
-fn initial(
-    door: &Door,
-    design: &DesignTable,
-    source: &Source,
-    lyapunov: LyapunovName,
-) -> Result<Option<Initial>, Failure> {
-    let Some(x) = &design.initial_state else {
-        return match design.initial_parameter {
-            Some(_) => door.refuse("design.initial_parameter", "belongs to initial_state, which is missing"),
-            None => Ok(None),
-        };
-    };
-    if design.method == MethodName::Stabilize {
-        return door.refuse("design.initial_state", "method \"stabilize\" has no cost to bound; remove it");
-    }
-    state(door, "design.initial_state", x, source.models[0].a.nrows())?;
-    let key = "design.initial_parameter";
-    let (parameter, model) = match (&design.initial_parameter, &source.polytope, &source.plant) {
-        (None, _, _) if lyapunov == LyapunovName::Common || source.models.len() == 1 => {
-            (None, (lyapunov == LyapunovName::Frozen).then(|| source.models[0].clone()))
-        }
-        (None, _, _) => return door.refuse(key, "is missing: the cost bound depends on the parameter at the start"),
-        (Some(weights), Some(polytope), _) => {
-            convex_weights(door, key, weights, polytope.len())?;
-            let model = (lyapunov == LyapunovName::Frozen).then(|| polytope.at(weights));
-            (Some(weights.clone()), model)
-        }
-        (Some(value), None, Some(plant)) => match (value.as_slice(), &plant.description().scheduling) {
-            ([rho], Some(scheduling)) if rho.is_finite() => match lyapunov {
-                LyapunovName::Common => (None, None),
-                LyapunovName::Frozen => (None, Some(linearize(&**plant, *rho))),
-                LyapunovName::ParameterDependent => {
-                    let grid: Vec<f64> = source.models.iter().map(|model| model.rho).collect();
-                    let Some(weights) = weights_between(&grid, *rho) else {
-                        let message = format!(
-                            "is {rho}: {} of the model's grid is from {} to {}",
-                            scheduling.parameter,
-                            grid[0],
-                            grid[grid.len() - 1]
-                        );
-                        return door.refuse(key, message);
-                    };
-                    (Some(weights), None)
-                }
-            },
-            (_, Some(scheduling)) => {
-                return door.refuse(key, format!("has to be one finite number, {}", scheduling.parameter));
-            }
-            (_, None) => return door.refuse(key, "the plant has no scheduling parameter; remove it"),
-        },
-        (Some(_), None, None) => return door.refuse(key, "has no model to belong to"),
-    };
-    Ok(Some(Initial { state: x.clone(), parameter, model }))
 }

@@ -1,5 +1,6 @@
 //! Numbers of the thesis beside the recomputed ones.
 
+use lpv::math::decimal::{Rounding, fixed, fixed_toward};
 use serde::Serialize;
 
 /// A number of a table, as printed and as it is.
@@ -61,14 +62,19 @@ impl Standing {
 }
 
 impl Entry {
-    /// The recomputed number with its decimals.
+    /// The recomputed number with its decimals; of a bound rounded to the safe side: costs up, rates, margins and regions down.
     pub fn shown(&self) -> String {
-        self.value.map_or("–".into(), |value| format!("{value:.*}", self.decimals))
+        let rounding = match self.standing {
+            Standing::BoundNumerical if self.quantity.contains("cost") => Rounding::Up,
+            Standing::BoundNumerical | Standing::Proved => Rounding::Down,
+            _ => Rounding::Nearest,
+        };
+        self.value.map_or("–".into(), |value| fixed_toward(value, self.decimals, rounding))
     }
 
     /// The printed number, with the decimals of the thesis.
     pub fn shown_printed(&self) -> String {
-        self.printed.map_or("–".into(), |value| format!("{value:.4}"))
+        self.printed.map_or("–".into(), |value| fixed(value, 4))
     }
 
     /// Whether the two agree to the four decimals of the thesis.

@@ -6,6 +6,7 @@ use crate::failure::Failure;
 use lpv::certificate::{ProofOptions, prove};
 use lpv::controller::Schedule;
 use lpv::math::Mat;
+use lpv::math::decimal::{Rounding, about, at_most, decimal, fixed_toward};
 use lpv::math::eigen::{spectral_abscissa, spectral_radius};
 use lpv::math::hold::discretize;
 use lpv::math::matrix::inverse_spd;
@@ -44,6 +45,11 @@ impl Entry {
     fn against(self, printed: f64) -> Self {
         Self { printed: Some(printed), ..self }
     }
+}
+
+/// Two digits of what was measured.
+fn short(value: f64) -> String {
+    decimal(value, 2, Rounding::Nearest)
 }
 
 /// Everything in one table.
@@ -103,9 +109,11 @@ fn printed_gain(fleet: &Fleet) -> Result<Vec<Entry>, Failure> {
             .because("Stable. Listing the vertices as K₄, K₃, K₂, K₁ does the same."),
         entry("K(ψ) as printed, at ψ + π, g = 9.81", relative, turned, 7, Standing::Computed)
             .because("Largest difference of an entry, relative: the four decimals printed."),
-        entry("g of the gains", "g / (m/s²)", THEIR_GRAVITY, 4, Standing::Computed)
-            .against(9.807)
-            .because(format!("Table 6.1 says 9.807; the gains differ from the Riccati gain by {theirs:.1e} with 9.81 and by {table:.1e} with 9.807.")),
+        entry("g of the gains", "g / (m/s²)", THEIR_GRAVITY, 4, Standing::Computed).against(9.807).because(format!(
+            "Table 6.1 says 9.807; the gains differ from the Riccati gain by {} with 9.81 and by {} with 9.807.",
+            short(theirs),
+            short(table)
+        )),
     ])
 }
 
@@ -132,7 +140,8 @@ fn arcs(fleet: &Fleet) -> Result<Vec<Entry>, Failure> {
     let mut entries = vec![
         entry("Theorems 4.1-4.4, whole circle", "λ of the mode that no input moves at its centre", eigenvalue[0], 9, Standing::Refuted).because(format!(
             "Infeasible, as the thesis says, but not because four vertices are conservative: the hull of any points around the circle holds its centre, where no \
-             input moves roll and pitch (w has {tilt:.6} of its length in φ and θ)."
+             input moves roll and pitch (w has {} of its length in φ and θ).",
+            about(tilt)
         )),
     ];
     for degrees in ARCS_DEG {
@@ -201,7 +210,7 @@ fn regions(fleet: &Fleet) -> Result<Vec<Entry>, Failure> {
             4,
             Standing::Computed,
         )
-        .because(format!("The gain that flies; its largest entry is {:.0}.", high.norm_max())),
+        .because(format!("The gain that flies; its largest entry is {}.", about(high.norm_max()))),
     );
     Ok(entries)
 }
@@ -227,7 +236,8 @@ fn steps(fleet: &Fleet) -> Vec<Entry> {
         vec![
             entry(row.clone(), "cost over 60 s", measured.actual_cost.unwrap_or(f64::NAN), 4, Standing::Integrated)
                 .because(format!(
-                    "x(0)ᵀPx(0) = {bound:.4}: the bound of the linear model, and without limits its cost."
+                    "x(0)ᵀPx(0) = {}: the bound of the linear model, and without limits its cost.",
+                    at_most(bound)
                 )),
             entry(row, "settling to 5 % / s", measured.settling_time_s.unwrap_or(f64::NAN), 2, Standing::Integrated),
         ]
@@ -259,8 +269,10 @@ fn edges(fleet: &Fleet) -> Vec<Entry> {
             let middle = 0.5 * (flown + lost);
             if flies(middle) { flown = middle } else { lost = middle }
         }
-        entry(row, "step that is lost / m", lost, 2, Standing::Integrated)
-            .because(format!("{flown:.2} m is flown. By bisection, so that a shorter one may be lost too. The certified step is far shorter."))
+        entry(row, "step that is lost / m", lost, 2, Standing::Integrated).because(format!(
+            "{} m is flown. By bisection, so that a shorter one may be lost too. The certified step is far shorter.",
+            fixed_toward(flown, 2, Rounding::Down)
+        ))
     };
     controllers.par_iter().map(of).collect()
 }
@@ -270,7 +282,10 @@ fn proofs(fleet: &Fleet) -> Result<Vec<Entry>, Failure> {
     let of = |(name, design): &(&str, &Design)| {
         let proofs = prove(design, &*fleet.plant, &ProofOptions::default())
             .map_err(|error| Failure::Defect(format!("the proof for the quadrotor: {error}")))?;
-        Ok(entry(*name, "proved yaw rate / (rad/s)", proofs.stable_up_to.unwrap_or(0.0), 4, Standing::Proved)
+        // none at all is not a rate of zero
+        let standing = if proofs.stable_up_to.is_some() { Standing::Proved } else { Standing::NoBound };
+        let rate = entry(*name, "proved yaw rate / (rad/s)", 0.0, 4, standing);
+        Ok(Entry { value: proofs.stable_up_to, ..rate }
             .because("Stability, and invariance of the certified set, with P(ψ) of the frozen designs, for every yaw. The thesis guarantees it at any rate."))
     };
     [("Theorem 4.5", &fleet.lpvqr[0]), ("Theorem 5.3, γ = 1", &fleet.low[0]), ("Theorem 5.3, γ = 20", &fleet.low[2])]

@@ -6,6 +6,7 @@ use super::responses::{Curve, responses};
 use crate::failure::Failure;
 use crate::figure::{Axis, Dash, Figure, Panel, Style};
 use lpv::math::Mat;
+use lpv::math::decimal::{Rounding, decimal, fixed_toward};
 use lpv::math::matrix::{diagonal, identity, inverse_spd, quadratic_form};
 use lpv::math::riccati;
 use lpv::model::Polytope;
@@ -129,7 +130,10 @@ pub fn chapter() -> Result<(Table, Vec<Figure>), Failure> {
                 printed[1],
                 flight.actual_cost,
                 Standing::Integrated,
-                format!("{why} Changes by {:.0e} with the tolerance.", flight.cost_change.max(1e-15)),
+                format!(
+                    "{why} Changes by {} with the tolerance.",
+                    decimal(flight.cost_change.max(1e-15), 1, Rounding::Up)
+                ),
                 4,
             ),
         ];
@@ -228,8 +232,8 @@ pub fn chapter() -> Result<(Table, Vec<Figure>), Failure> {
         decimals: 5,
         standing: Standing::Floor,
         reason: format!(
-            "Pontryagin's principle on the nonlinear pendulum, by shooting; the trajectory begins {:.0e} from x(0).",
-            optimum.residual
+            "Pontryagin's principle on the nonlinear pendulum, by shooting; the trajectory begins {} from x(0).",
+            decimal(optimum.residual, 1, Rounding::Up)
         ),
     });
     let table = Table {
@@ -237,8 +241,8 @@ pub fn chapter() -> Result<(Table, Vec<Figure>), Failure> {
         title: "LPVQR of the pendulum with various Lyapunov functions".into(),
         setting: format!(
             "ẋ₁ = x₂, ẋ₂ = −0.1x₂ + sin x₁ + u; Q = diag(4, 4), R = 1; x(0) = [π, 0], ρ(0) = (0, 1) (not stated in the thesis). \
-             ν = ±(ν₀, −ν₀) with ν₀ = {:.8} |ẋ₁|. Actual costs: Dormand–Prince 8(5,3), relative tolerance 10⁻¹¹.",
-            steepest_slope()
+             ν = ±(ν₀, −ν₀) with ν₀ = {} |ẋ₁|. Actual costs: Dormand–Prince 8(5,3), relative tolerance 10⁻¹¹.",
+            fixed_toward(steepest_slope(), 8, Rounding::Up)
         ),
         entries,
     };
@@ -249,8 +253,8 @@ pub fn chapter() -> Result<(Table, Vec<Figure>), Failure> {
         number: "4.1",
         title: "The parameter ρ and its slope".into(),
         caption: format!(
-            "Left: ρ₁ = sin x₁ / x₁ and ρ₂ = 1 − ρ₁. Right: dρ₁/dx₁; its largest size on [−π, π], {:.6} at x₁ = 2.0816, bounds ρ̇ by |ẋ₁|.",
-            steepest_slope()
+            "Left: ρ₁ = sin x₁ / x₁ and ρ₂ = 1 − ρ₁. Right: dρ₁/dx₁; its largest size on [−π, π], {} at x₁ = 2.0816, bounds ρ̇ by |ẋ₁|.",
+            fixed_toward(steepest_slope(), 6, Rounding::Up)
         ),
         columns: 2,
         aspect: 0.7,

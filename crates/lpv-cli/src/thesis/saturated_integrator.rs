@@ -6,6 +6,7 @@ use super::responses::{Curve, responses};
 use crate::failure::Failure;
 use crate::figure::{Axis, Dash, Figure, Panel, Style};
 use lpv::math::Mat;
+use lpv::math::decimal::{Rounding, decimal};
 use lpv::math::matrix::{diagonal, identity, quadratic_form};
 use lpv::math::riccati::{self, Regulator};
 use lpv::model::{Polytope, linearize};
@@ -113,7 +114,8 @@ pub fn chapter() -> Result<(Table, Vec<Figure>), Failure> {
     );
     gain("SLQR gain (5.9), γ = 1", PRINTED_SLQR, &low[0].k, "");
     let reason = format!(
-        "Not unique: the printed gain is this point of the segment of solutions F + s(R⁻¹BᵀP − F), {from_segment:.0e} off it relatively."
+        "Not unique: the printed gain is this point of the segment of solutions F + s(R⁻¹BᵀP − F), {} off it relatively.",
+        decimal(from_segment, 1, Rounding::Up)
     );
     gain("High gain (5.14), γ = 1", PRINTED_HIGH, &high[0].k, &reason);
     entries.push(Entry {
@@ -163,7 +165,10 @@ fn add(
         value: Some(flight.actual_cost),
         decimals: 4,
         standing: Standing::Integrated,
-        reason: format!("{why_cost} Changes by {:.0e} with the tolerance.", flight.cost_change.max(1e-15)),
+        reason: format!(
+            "{why_cost} Changes by {} with the tolerance.",
+            decimal(flight.cost_change.max(1e-15), 1, Rounding::Up)
+        ),
     });
 }
 

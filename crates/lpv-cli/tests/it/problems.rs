@@ -338,12 +338,12 @@ fn a_motion_that_costs_nothing_is_named() {
     let (place, text) = case("undetectable-yaw.toml");
     place
         .lpv("design scenario.toml")
-        .refuses(3, &["unbounded", "the motion x6 does not decay", "(λ = 0)", "weight in Q"]);
+        .refuses(3, &["unbounded", "the motion x4 does not decay", "(λ = 0)", "weight in Q"]);
     // with a weight there is a regulator
     let start = text.find("Q = [").unwrap();
     let (before, after) = (&text[..start], &text[start..]);
     let (_, rest) = after.split_once("R = ").unwrap();
-    let weighed = format!("{before}Q_diag = [10, 10, 10, 0, 0, 1, 0, 0, 0, 0, 0, 0]\nR = {rest}");
+    let weighed = format!("{before}Q_diag = [10, 10, 10, 1, 0, 0, 0, 0, 0, 0, 0, 0]\nR = {rest}");
     let answer = parsed(&Place::with(&weighed).succeed("design scenario.toml --json"));
     assert_eq!(answer["status"], "solved");
 }

@@ -116,6 +116,33 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     if value != 0.0 && value.is_finite() && reads_as_zero { format!("{value:.2e}") } else { text }
 }
 
+/// [`fixed`], rounded as asked: a column of bounds.
+pub fn fixed_toward(value: f64, decimals: usize, rounding: Rounding) -> String {
+    let nearest = format!("{value:.decimals$}");
+    let read: f64 = nearest.parse().unwrap_or(f64::NAN);
+    let is_safe = match rounding {
+        Rounding::Nearest => true,
+        Rounding::Up => read >= value,
+        Rounding::Down => read <= value,
+    };
+    let digits: String = nearest.chars().filter(|c| *c != '.').collect();
+    let (Ok(units), true) = (digits.parse::<i128>(), value.is_finite()) else {
+        return decimal(value, DIGITS, rounding);
+    };
+    let units = match (is_safe, rounding) {
+        (true, _) => units,
+        (false, Rounding::Up) => units + 1,
+        (false, _) => units - 1,
+    };
+    if units == 0 && value != 0.0 {
+        return decimal(value, 3, rounding);
+    }
+    let text = format!("{:0>width$}", units.unsigned_abs(), width = decimals + 1);
+    let (whole, rest) = text.split_at(text.len() - decimals);
+    let point = if decimals == 0 { "" } else { "." };
+    format!("{}{whole}{point}{rest}", if units < 0 { "-" } else { "" })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,7 +183,28 @@ mod tests {
         );
     }
 
+    #[test]
+    fn columns_of_bounds_err_to_the_safe_side() {
+        use Rounding::{Down, Nearest, Up};
+        assert_eq!((fixed_toward(1.25, 1, Up), fixed_toward(1.25, 1, Down)), ("1.3".into(), "1.2".into()));
+        assert_eq!((fixed_toward(-1.25, 1, Up), fixed_toward(-1.25, 1, Down)), ("-1.2".into(), "-1.3".into()));
+        assert_eq!((fixed_toward(0.1, 3, Up), fixed_toward(0.1, 3, Down)), ("0.100".into(), "0.100".into()));
+        assert_eq!((fixed_toward(0.99999, 2, Up), fixed_toward(9.999, 1, Down)), ("1.00".into(), "9.9".into()));
+        assert_eq!((fixed_toward(1e-9, 4, Up), fixed_toward(1e-9, 4, Down)), ("0.0001".into(), "1e-9".into()));
+        assert_eq!((fixed_toward(-1e-9, 4, Up), fixed_toward(0.0, 2, Down)), ("-1e-9".into(), "0.00".into()));
+        assert_eq!((fixed_toward(2.5e300, 2, Up), fixed_toward(f64::NAN, 2, Up)), ("2.5e300".into(), "NaN".into()));
+        assert_eq!((fixed_toward(7.0, 0, Down), fixed_toward(123.456, 2, Nearest)), ("7".into(), "123.46".into()));
+    }
+
     proptest! {
+        #[test]
+        fn columns_keep_the_side(value in -1e6..1e6f64, decimals in 0..9usize) {
+            let [down, up]: [f64; 2] =
+                [Rounding::Down, Rounding::Up].map(|rounding| fixed_toward(value, decimals, rounding).parse().unwrap());
+            prop_assert!(down <= value && value <= up, "{down} {value} {up}");
+            prop_assert!(up - down <= 1.001 * 10.0_f64.powi(-(decimals as i32)) + 1e-9);
+        }
+
         /// Printed and read back the number is on the side that was asked for, within a unit of the last digit.
         #[test]
         fn the_side_is_kept(bits in any::<u64>()) {

@@ -40,7 +40,7 @@ use crate::math::riccati::{self, Regulator, RiccatiError};
 use crate::math::stabilizability::{Mode, Stabilizability, stabilizability};
 use crate::model::{FrozenModel, Polytope};
 use inequality::{DoubleSum, Unknowns, Weights};
-use lmi::{Answer, Carrier, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
+use lmi::{Answer, BlockReport, Carrier, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
 use moderation::{COST_LADDER, MARGIN_LADDER, Moderated, Stage};
 use objective::Posed;
 
@@ -453,8 +453,17 @@ fn regulate(
     Ok(design)
 }
 
-/// What is added to a solution of the Riccati equation, relatively, smallest first.
-const STRICT: [f64; 7] = [1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3];
+/// What is added to a solution of the Riccati equation: the least that is tried, relatively, the factor from one to the next, and how many.
+const STRICT: (f64, f64, i32) = (1e-14, 10.0, 12);
+
+/// P + εX of [`riccati::strict`], with Y, L and their proved inequalities.
+struct Strict {
+    epsilon: f64,
+    p: Mat<f64>,
+    y: Mat<f64>,
+    l: Mat<f64>,
+    blocks: Vec<BlockReport>,
+}
 
 /// Theorem 2.1 by the Riccati equation, where the solver stopped short of its optimum: the P of least ε that is proved to satisfy the
 /// inequalities of `problem`. With an unobserved motion that decays the optimum is not attained; the gain is that of the optimum all the same.
@@ -466,14 +475,19 @@ fn by_riccati(
     regulator: &Regulator,
 ) -> Result<Option<PolytopicDesign>, SynthesisError> {
     let (a, b) = (polytope.a(0), polytope.b(0));
-    for epsilon in STRICT {
-        let Some(p) = riccati::strict((a, b), (&cost.q, &cost.r), regulator, epsilon) else { continue };
-        let Some(y) = inverse_spd(&p) else { continue };
+    let at = |step: i32| -> Result<Option<Strict>, SynthesisError> {
+        let epsilon = STRICT.0 * STRICT.1.powi(step);
+        let Some(p) = riccati::strict((a, b), (&cost.q, &cost.r), regulator, epsilon) else { return Ok(None) };
+        let Some(y) = inverse_spd(&p) else { return Ok(None) };
         let l = &regulator.k * &y;
         let blocks = problem.verify(&[y.clone(), l.clone()])?;
-        if !blocks.iter().all(|block| block.verified_lower_bound > 0.0) {
-            continue;
-        }
+        let holds = blocks.iter().all(|block| block.verified_lower_bound > 0.0);
+        Ok(holds.then_some(Strict { epsilon, p, y, l, blocks }))
+    };
+    for step in 0..STRICT.2 {
+        let Some(least) = at(step)? else { continue };
+        // one more, so that it does not hold by the last digit
+        let Strict { epsilon, p, y, l, blocks } = at(step + 1)?.unwrap_or(least);
         let mut answer = answer.clone();
         (answer.objective, answer.blocks) = (trace(&y), blocks);
         let solution = Solution {
