@@ -100,6 +100,16 @@ pub enum ClaimKind {
         /// T, s.
         sample_time_s: f64,
     },
+    /// With zero-order hold and saturation the cost is at most `factor` V(x(0)), from x(0) in {V ≤ γ} where there is a level: of the loop as
+    /// it flies, without a parameter.
+    SampledCost {
+        /// κ; infinite where none is found.
+        factor: f64,
+        /// γ; `None` where the bound holds from everywhere.
+        level: Option<f64>,
+        /// T, s.
+        sample_time_s: f64,
+    },
     /// The governed reference is a motion of the model, up to what the sets absorb.
     GovernedMotion {
         /// States that it moves.
@@ -288,6 +298,7 @@ impl ClaimKind {
             Self::Cost { .. } => "cost",
             Self::SampledStability { .. } => "sampled-stability",
             Self::SampledInvariance { .. } => "sampled-invariance",
+            Self::SampledCost { .. } => "sampled-cost",
             Self::GovernedMotion { .. } => "governed-motion",
             Self::InducedGain { .. } => "induced-gain",
             Self::AsAsked { what, .. } => match *what {
@@ -338,6 +349,14 @@ impl ClaimKind {
                 "the saturated loop sampled at T = {sample_time_s} s keeps {v} <= {} invariant{fixed}",
                 at_least(*level)
             ),
+            Self::SampledCost { factor, level, sample_time_s } => {
+                let from = level.map_or(String::new(), |level| format!(" from {v} <= {}", at_least(level)));
+                let bound = match factor.is_finite() {
+                    true => format!("at most {} {}", at_most(*factor), of_the_start(v)),
+                    false => format!("bounded by a multiple of {}", of_the_start(v)),
+                };
+                format!("the cost of the saturated loop sampled at T = {sample_time_s} s is {bound}{from}")
+            }
             Self::GovernedMotion { states, farthest } => format!(
                 "the governed reference moves as the model does (moves of {} by up to {farthest}, of angles by half a turn)",
                 states.join(", ")

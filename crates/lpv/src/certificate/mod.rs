@@ -16,7 +16,7 @@ pub use claim::{Claim, ClaimId, ClaimKind, Member, Motion, Of, Subject, Verdict,
 pub use inequality::{BlockMargin, block_margins};
 pub use proof::{
     COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Record,
-    RecordError, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic,
+    RecordError, SampledCost, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic, prove_sampled_cost,
 };
 pub use region::{
     Excursion, LyapunovFunction, StepBound, StepConditions, UnmetCondition, excursion, step_bound, unsaturated_level,
