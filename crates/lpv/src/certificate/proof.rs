@@ -25,6 +25,7 @@ mod sampled_constant;
 mod sampled_cost;
 mod sampled_saturated;
 mod sampled_spectrum;
+mod value;
 mod weights;
 mod witness;
 
