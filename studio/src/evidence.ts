@@ -143,8 +143,8 @@ function facts(report: Report, claim: Claim): [string, Node | string][] {
 }
 
 function system(report: Report, claim: Claim): string {
-  if (claim.kind === "step-cost" && claim.of === "plant") return "this flight of the plant, sampled and saturated";
-  if (isOfFlight(claim)) return claim.of === "plant" ? "this flight of the plant" : `this flight, by the ${report.plant.linear ? "loop in continuous time" : "LPV model"}`;
+  if (claim.premises.includes("sampled-cost")) return "this flight of the plant, sampled and saturated";
+  if (isOfFlight(claim)) return claim.of === "plant" ? "this flight of the plant, in continuous time" : `this flight, by the ${report.plant.linear ? "loop in continuous time" : "LPV model"}`;
   if (claim.kind === "weights") return "the weights of the cost";
   if (claim.of === "plant") return "the nonlinear plant";
   return report.plant.linear ? "the plant, which is linear" : "the LPV model of the nonlinear plant";
@@ -206,7 +206,7 @@ function conditions({ scheduling }: Report, claim: Claim): string[] {
 /** What the loop has around it, and the claim has not. */
 function surroundings({ report, run }: Context, claim: Claim): string[] {
   const hold = `Sampling: the claim is about a controller in continuous time, this one holds its inputs for ${about(report.sample_time_s)} s.`;
-  const isSampled = ["sampled-stability", "sampled-cost"].includes(claim.kind) || (claim.kind === "step-cost" && claim.of === "plant");
+  const isSampled = ["sampled-stability", "sampled-cost"].includes(claim.kind) || claim.premises.includes("sampled-cost");
   const between = claim.kind === "sampled-invariance" ? ["The motion between samples."] : isSampled ? [] : [hold];
   const isEstimated = run.estimation !== null || run.measurement !== null;
   return [

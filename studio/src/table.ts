@@ -116,12 +116,18 @@ function setRate(run: Run): number | null {
 function costBound(report: Report, run: Run): (Node | string)[] {
   const note = run.guaranteed_cost_note;
   const sub = (...children: (Node | string)[]): HTMLElement => el("div", { class: "run-sub" }, ...children);
-  const bound = run.guaranteed_cost ?? run.model_cost_bound;
+  const bound = shownBound(run);
   if (bound === null) return [dash("no bound"), ...(note === "" ? [] : [sub(note)])];
   const worth = sub(el("span", { class: `word-${run.guaranteed_cost_verdict}` }, run.guaranteed_cost_verdict), note === "" ? "" : ` · ${note}`);
   const text = `≤ ${atMost(bound)}`;
   if (run.guaranteed_cost !== null) return [text, worth];
+  if (run.plant_cost_bound !== null) return [text, el("div", { class: "run-sub", title: "It does not cover that the controller is sampled, or noise." }, "of the plant in continuous time"), worth];
   return [text, el("div", { class: "run-sub", title: modelGaps(report) }, "of the model"), worth];
+}
+
+/** The bound that says most. */
+function shownBound(run: Run): number | null {
+  return run.guaranteed_cost ?? run.plant_cost_bound ?? run.model_cost_bound;
 }
 
 /** What a bound of the model does not cover. */
@@ -133,13 +139,14 @@ function modelGaps(report: Report): string {
 /** The cost of the flight; it may exceed a bound of the model, or one whose conditions the flight left, and then says so. */
 function actualCost(run: Run): (Node | string)[] {
   if (run.actual_cost === null) return [dash("no cost: the run did not complete")];
-  const bound = run.guaranteed_cost ?? run.model_cost_bound;
+  const bound = shownBound(run);
   const exceeds = bound !== null && run.actual_cost > bound * (1 + 1e-9);
   const text = about(run.actual_cost);
   if (!exceeds) return [text];
-  const isOfModel = run.guaranteed_cost === null;
-  const why = isOfModel ? "The bound is of the model in continuous time: it does not cover the plant that flies" : "The flight contradicts what is proved";
-  return [text, el("div", { class: "run-sub outcome-bad", title: why }, isOfModel ? "above the bound of the model" : "above bound")];
+  if (run.guaranteed_cost !== null) return [text, el("div", { class: "run-sub outcome-bad", title: "The flight contradicts what is proved" }, "above bound")];
+  const isOfModel = run.plant_cost_bound === null;
+  const why = `The bound is ${isOfModel ? "of the model " : ""}in continuous time: it does not cover the ${isOfModel ? "plant" : "sampled loop"} that flies`;
+  return [text, el("div", { class: "run-sub outcome-bad", title: why }, isOfModel ? "above the bound of the model" : "above the bound in continuous time")];
 }
 
 function dash(why: string): HTMLElement {

@@ -85,7 +85,7 @@ for (const [name, width, mode] of [["wide", 1440, "light"], ["wide-dark", 1440, 
 
     test("no bound on a cost is shown below what it is", async () => {
       for (const run of report.runs) {
-        const cost = run.guaranteed_cost ?? run.model_cost_bound;
+        const cost = run.guaranteed_cost ?? run.plant_cost_bound ?? run.model_cost_bound;
         if (cost === null) continue;
         const text = await rowOf(opened.page, run).locator(".col-bound").innerText();
         const shown = shownNumber(text.slice(text.indexOf("≤")));

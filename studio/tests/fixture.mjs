@@ -174,6 +174,7 @@ function makeRun(spec, index, { time, duration_s, steps, estimation }) {
     ...claimsOf(spec),
     outcome: flight.diverged === null ? { kind: "completed" } : { kind: "diverged", time_s: last.t, state: "θ", detail: "|θ| reached 90°: the Euler angles have no meaning beyond." },
     guaranteed_cost: spec.guaranteed ? spec.bound : null,
+    plant_cost_bound: null,
     model_cost_bound: spec.guaranteed ? null : spec.bound,
     guaranteed_cost_of: spec.guaranteed ? "plant" : "model",
     guaranteed_cost_note: spec.bound === null ? "" : "frozen yaw",

@@ -4,8 +4,9 @@ use crate::failure::Failure;
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::{StepStay, step_stays};
 use lpv::certificate::{
-    BoundBasis, Claim, ClaimId, ClaimKind, Excursion, LyapunovFunction, Member, Of, Proofs, StepBound, StepConditions,
-    Subject, SupervisedProofs, UnmetCondition, Verdict, Words, excursion, prove_sampled_cost, step_bound, unrest,
+    BoundBasis, BoundOf, Claim, ClaimId, ClaimKind, Excursion, LyapunovFunction, Member, Of, Proofs, StepBound,
+    StepConditions, Subject, SupervisedProofs, UnmetCondition, Verdict, Words, excursion, prove_sampled_cost,
+    step_bound, unrest,
 };
 use lpv::math::decimal::{about, at_least, at_most};
 use lpv::model::linearize;
@@ -78,20 +79,27 @@ impl Flown {
         self.bound().filter(|_| self.bounds.iter().all(StepBound::is_guaranteed)).map(|(bound, _)| bound)
     }
 
-    /// The bound of the LPV model with a controller in continuous time, where none is guaranteed.
-    pub fn model_cost_bound(&self) -> Option<f64> {
-        self.bound().filter(|_| !self.bounds.iter().all(StepBound::is_guaranteed)).map(|(bound, _)| bound)
+    /// The bound of the nonlinear plant with a controller in continuous time, where that is proved of every step.
+    pub fn plant_cost_bound(&self) -> Option<f64> {
+        let is_of_plant =
+            |bound: &StepBound| bound.verdict == Verdict::Proved && bound.of == BoundOf::PlantInContinuousTime;
+        self.bound().filter(|_| self.bounds.iter().all(is_of_plant)).map(|(bound, _)| bound)
     }
 
-    /// What the one or the other is worth.
+    /// The bound of the LPV model with a controller in continuous time, where none is proved of the plant.
+    pub fn model_cost_bound(&self) -> Option<f64> {
+        let of_plant = self.guaranteed_cost().or(self.plant_cost_bound());
+        self.bound().filter(|_| of_plant.is_none()).map(|(bound, _)| bound)
+    }
+
+    /// What the one that there is is worth.
     pub fn bound_verdict(&self) -> Verdict {
         self.bound().map_or(Verdict::Undecided, |(_, verdict)| verdict)
     }
 
-    /// Which system the bounds are of.
-    pub fn bounds_are_of(&self) -> Of {
-        let is_plant = !self.bounds.is_empty() && self.bounds.iter().all(|bound| bound.of == Of::Plant);
-        if is_plant { Of::Plant } else { Of::Model }
+    /// Which system the bounds are of: the one that says least, where they are of several.
+    pub fn bounds_are_of(&self) -> BoundOf {
+        self.bounds.iter().map(|bound| bound.of).min().unwrap_or(BoundOf::Model)
     }
 }
 
@@ -244,7 +252,7 @@ fn step_bounds(
 ) -> (Vec<StepBound>, Vec<Claim>) {
     let scheduling = scenario.plant.description().scheduling.as_ref();
     let states = &scenario.plant.description().states;
-    let (basis, rests_on, mut claims) = basis(scenario, design, proofs);
+    let (bases, mut claims) = bases(scenario, design, proofs);
     let bound = |(k, step): (usize, &StepResponse)| {
         let sample = |time_s: f64| trajectory.time_s.partition_point(|&t| t < time_s - 1e-9);
         let start = sample(step.time_s);
@@ -263,7 +271,7 @@ fn step_bounds(
             peak_parameter_rate: step.peak_parameter_rate,
             noise: plan.noise,
         };
-        let bound = step_bound(design, &*scenario.plant, basis.as_ref(), &conditions);
+        let bound = step_bound(design, &*scenario.plant, &bases, &conditions);
         let inside = match bound.level {
             None => "inputs are not limited, so the certified set is everything".to_owned(),
             Some(level) if bound.is_inside() => format!("inside the certified set of level {}", at_least(level)),
@@ -306,11 +314,14 @@ fn step_bounds(
         let beyond = excursions(scenario, design, trajectory, [step.time_s, end], bound.level);
         let kind = ClaimKind::StepCost { step: k + 1, time_s: step.time_s, bound: bound.bound };
         let of = match bound.of {
-            Of::Plant => "; of the loop as it flies, sampled and saturated",
-            Of::Model if scenario.is_linear() => {
+            BoundOf::Plant => "; of the loop as it flies, sampled and saturated",
+            BoundOf::PlantInContinuousTime => {
+                "; of the nonlinear plant with a controller in continuous time, which knows nothing of the sampling"
+            }
+            BoundOf::Model if scenario.is_linear() => {
                 "; a bound of the loop in continuous time, which knows nothing of the sampling"
             }
-            Of::Model => {
+            BoundOf::Model => {
                 "; a bound of the LPV model in continuous time, which knows nothing of what linearisation leaves out"
             }
         };
@@ -324,8 +335,8 @@ fn step_bounds(
             bound.level.map_or(f64::INFINITY, |level| level - bound.value),
             inside + of + worth + &holds + &others.collect::<String>() + &beyond,
         );
-        let claim = Claim { premises: rests_on.clone(), ..claim };
-        let claim = if bound.of == Of::Plant { claim.of_plant() } else { claim };
+        let claim = if bound.of == BoundOf::Model { claim } else { claim.of_plant() };
+        let claim = Claim { premises: premises(&bases, bound.of), ..claim };
         (bound, claim)
     };
     let (bounds, of_steps): (Vec<StepBound>, Vec<Claim>) = performance.steps.iter().enumerate().map(bound).unzip();
@@ -343,26 +354,29 @@ pub fn while_rate(scenario: &Scenario, bound: &StepBound) -> Option<String> {
     })
 }
 
-/// What the bounds of steps rest on: of a linear plant the proof about the sampled loop, else what is proved of the LPV model. With the claims that
-/// they rest on, and those of them that have to be added.
-fn basis(
-    scenario: &Scenario,
-    design: &Design,
-    proofs: Option<&Proofs>,
-) -> (Option<BoundBasis>, Vec<ClaimId>, Vec<Claim>) {
-    let id = |name: &'static str| ClaimId { name, subject: Subject { of: Of::Model, member: Member::Outer } };
+/// What the bounds of steps rest on, the best first: of a linear plant the proof about the sampled loop, else what is proved of the nonlinear plant and
+/// of the LPV model. With the claims that are not among those about the design.
+fn bases(scenario: &Scenario, design: &Design, proofs: Option<&Proofs>) -> (Vec<BoundBasis>, Vec<Claim>) {
     let sampled = scenario.is_linear().then(|| prove_sampled_cost(design, &*scenario.plant).ok()).flatten();
-    if let Some(sampled) = sampled {
-        if let Some(basis) = BoundBasis::of_flight(design, &sampled) {
-            let known = |claim: &Claim| proofs.is_some_and(|proofs| proofs.claims.iter().any(|c| c.id == claim.id));
-            let added = sampled.claims.into_iter().filter(|claim| !known(claim)).collect();
-            return (Some(basis), vec![id("sampled-cost")], added);
-        }
+    if let Some((sampled, basis)) = sampled.and_then(|s| BoundBasis::of_flight(design, &s).map(|basis| (s, basis))) {
+        let known = |claim: &Claim| proofs.is_some_and(|proofs| proofs.claims.iter().any(|c| c.id == claim.id));
+        let added = sampled.claims.into_iter().filter(|claim| !known(claim)).collect();
+        return (vec![basis], added);
     }
-    match proofs.and_then(|proofs| BoundBasis::of_model(design, proofs)) {
-        Some(basis) => (Some(basis), vec![id("cost")], Vec::new()),
-        None => (None, Vec::new(), Vec::new()),
-    }
+    let proved = proofs.map(|proofs| [BoundBasis::of_plant(design, proofs), BoundBasis::of_model(design, proofs)]);
+    (proved.into_iter().flatten().flatten().collect(), Vec::new())
+}
+
+/// The claim about the design that a bound of this system rests on, where it rests on one.
+fn premises(bases: &[BoundBasis], of: BoundOf) -> Vec<ClaimId> {
+    let (name, of_claim) = match of {
+        BoundOf::Plant => ("sampled-cost", Of::Model),
+        BoundOf::PlantInContinuousTime => ("cost", Of::Plant),
+        BoundOf::Model => ("cost", Of::Model),
+    };
+    let is_proved = bases.iter().any(|basis| basis.of == of);
+    let subject = Subject { of: of_claim, member: Member::Outer };
+    is_proved.then_some(ClaimId { name, subject }).into_iter().collect()
 }
 
 /// When and for how long a step was outside the set of this level, and faster than the rate of the design (a frozen design is

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::flights::{Flown, while_rate};
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::StepStay;
-use lpv::certificate::{Claim, ClaimKind, Member, Motion, Of, StepBound, Subject, UnmetCondition, Verdict};
+use lpv::certificate::{BoundOf, Claim, ClaimKind, Member, Motion, Of, StepBound, Subject, UnmetCondition, Verdict};
 use lpv::math::decimal::{Rounding, at_most, decimal};
 use lpv::model::BoxWeights;
 use lpv::plant::{Description, Scene};
@@ -81,12 +81,14 @@ struct RunData<'a> {
     outcome: OutcomeData,
     /// Of the plant as it flies.
     guaranteed_cost: Option<f64>,
+    /// Of the nonlinear plant with a controller in continuous time.
+    plant_cost_bound: Option<f64>,
     /// Of the LPV model with a controller in continuous time.
     model_cost_bound: Option<f64>,
     guaranteed_cost_verdict: Verdict,
     guaranteed_cost_note: String,
-    /// Which system the bound is of: the LPV model, or the plant as it flies.
-    guaranteed_cost_of: Of,
+    /// Which system the bound is of.
+    guaranteed_cost_of: BoundOf,
     actual_cost: Option<f64>,
     settling_time_s: Option<f64>,
     peak_input: f64,
@@ -237,6 +239,7 @@ fn run<'a>(
             },
         },
         guaranteed_cost: flown.guaranteed_cost(),
+        plant_cost_bound: flown.plant_cost_bound(),
         model_cost_bound: flown.model_cost_bound(),
         guaranteed_cost_verdict: flown.bound_verdict(),
         guaranteed_cost_note: bound_note(scenario, flown),
@@ -361,7 +364,7 @@ pub fn bound_note(scenario: &Scenario, flown: &Flown) -> String {
         [_] => remarks(0).join(", "),
         steps => {
             let spell = |(k, bound): (usize, &StepBound)| {
-                let system = if bound.of == Of::Model { "model: ≤" } else { "≤" };
+                let system = system_word(bound.of);
                 let remarks = remarks(k).join(", ");
                 match bound.verdict {
                     Verdict::Undecided | Verdict::Refuted => format!("step {} {remarks}", k + 1),
@@ -373,6 +376,15 @@ pub fn bound_note(scenario: &Scenario, flown: &Flown) -> String {
             };
             steps.iter().enumerate().map(spell).collect::<Vec<_>>().join("; ")
         }
+    }
+}
+
+/// Of which system a bound is, in front of it.
+pub fn system_word(of: BoundOf) -> &'static str {
+    match of {
+        BoundOf::Plant => "≤",
+        BoundOf::PlantInContinuousTime => "plant in continuous time: ≤",
+        BoundOf::Model => "model: ≤",
     }
 }
 

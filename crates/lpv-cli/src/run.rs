@@ -21,6 +21,9 @@ pub struct RunArguments {
     /// Also prove the designs over the whole range of the parameter, and compare the proved rates with the flown ones
     #[arg(long)]
     prove: bool,
+    /// The same, and of the nonlinear plant on the largest set that can be proved (takes longer)
+    #[arg(long)]
+    nonlinear: bool,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -32,8 +35,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let place = scenario.result_folder(arguments.output.out.as_deref());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
     let mut checked = designs::design_all(&scenario)?;
-    let proofs = match arguments.prove {
-        true => designs::prove_all(&scenario, &mut checked),
+    let proofs = match arguments.prove || arguments.nonlinear {
+        true => designs::prove_all(&scenario, &mut checked, arguments.nonlinear),
         false => checked.iter().map(|checked| Some(checked.proofs.as_ref()?.members[0].clone())).collect(),
     };
     let certified: Vec<Certified> = (checked.iter().zip(&proofs))

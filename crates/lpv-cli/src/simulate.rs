@@ -34,6 +34,7 @@ struct FlightSummary<'a> {
     #[serde(flatten)]
     performance: &'a Performance,
     guaranteed_cost: Option<f64>,
+    plant_cost_bound: Option<f64>,
     model_cost_bound: Option<f64>,
     claims: &'a [Claim],
     estimator_consistency: Option<&'a Consistency>,
@@ -107,6 +108,7 @@ fn summary<'a>(name: &'a str, flown: &'a Flown) -> FlightSummary<'a> {
         outcome: &flown.flight.outcome,
         performance: &flown.performance,
         guaranteed_cost: flown.guaranteed_cost(),
+        plant_cost_bound: flown.plant_cost_bound(),
         model_cost_bound: flown.model_cost_bound(),
         claims: &flown.claims,
         estimator_consistency: flown.flight.consistency.as_ref(),

@@ -2,8 +2,9 @@
 
 use crate::designs::CheckedDesign;
 use crate::flights::Flown;
-use crate::report::bound_note;
+use crate::report::{bound_note, system_word};
 use crate::scenario::Scenario;
+use lpv::certificate::BoundOf;
 use lpv::math::decimal::{at_most, fixed};
 use lpv::sim::Outcome;
 
@@ -21,11 +22,14 @@ pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flo
         let note = bound_note(scenario, flown);
         let verdict = flown.bound_verdict().word();
         let worth = if note.is_empty() { format!("({verdict})") } else { format!("({verdict}: {note})") };
-        let bound = match (flown.guaranteed_cost(), flown.model_cost_bound()) {
-            (Some(bound), _) => format!("≤ {} {worth}", at_most(bound)),
-            (None, Some(bound)) => format!("model: ≤ {} {worth}", at_most(bound)),
-            (None, None) => note,
-        };
+        let bounds = [
+            (BoundOf::Plant, flown.guaranteed_cost()),
+            (BoundOf::PlantInContinuousTime, flown.plant_cost_bound()),
+            (BoundOf::Model, flown.model_cost_bound()),
+        ];
+        let bound =
+            bounds.into_iter().find_map(|(of, bound)| Some(format!("{} {} {worth}", system_word(of), at_most(bound?))));
+        let bound = bound.unwrap_or(note);
         rows.push(vec![
             plan.label.clone(),
             checked.verdict().word().to_owned(),

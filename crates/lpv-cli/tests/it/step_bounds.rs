@@ -45,6 +45,30 @@ fn a_bound_of_the_model_is_no_guarantee() {
     assert_eq!(controllers(&record)[0]["guaranteed_cost"], Value::Null);
 }
 
+/// Close to rest the pendulum itself is bounded, by what is proved of its sine, with a controller in continuous time; farther out its model alone.
+#[test]
+fn a_small_step_of_the_pendulum_is_bounded_itself() {
+    let (record, table) = run(case("bound_of_the_model.toml"), "--nonlinear");
+    assert!(table.contains("model: ≤ 1.300"), "{table}");
+    assert_eq!(controllers(&record)[0]["plant_cost_bound"], Value::Null);
+    let text = edited(&case("bound_of_the_model.toml"), "x_1 = -0.997438, x_2 = 1.388862", "x_1 = -0.05, x_2 = 0.05");
+    let (record, table) = run(&text, "--nonlinear");
+    for controller in controllers(&record) {
+        assert_eq!(
+            (&controller["guaranteed_cost"], &controller["model_cost_bound"]),
+            (&Value::Null, &Value::Null),
+            "{table}"
+        );
+        assert_eq!(controller["guaranteed_cost_of"], "plant-in-continuous-time");
+        let [bound, cost] = ["plant_cost_bound", "actual_cost"].map(|key| controller[key].as_f64().unwrap());
+        assert!(cost <= bound && bound < 1.2 * cost, "{cost} {bound}");
+        assert_eq!(step_claim(controller, 1)["premises"], serde_json::json!(["plant.cost"]));
+        let claims = controller["design_claims"].as_array().unwrap();
+        assert!(claims.iter().any(|claim| claim["id"] == "plant.cost" && claim["verdict"] == "proved"), "{controller}");
+    }
+    assert!(table.contains("plant in continuous time: ≤ ") && table.contains("(proved)"), "{table}");
+}
+
 #[test]
 fn a_reference_that_no_input_holds_has_no_bound() {
     let (record, table) = run(case("step_not_at_rest.toml"), "");

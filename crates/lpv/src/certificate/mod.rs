@@ -24,7 +24,7 @@ pub use proof::{
 };
 pub use rest::{Unrest, rests_exactly, unrest};
 pub use stability::{StabilityMargin, frozen_stability};
-pub use step::{BoundBasis, StepBound, StepConditions, UnmetCondition, step_bound};
+pub use step::{BoundBasis, BoundOf, StepBound, StepConditions, UnmetCondition, step_bound};
 pub use supervised::{SupervisedProofs, prove_supervised};
 
 use crate::math::decimal::{Rounding, about, decimal};

@@ -2,10 +2,11 @@
 //!
 //! A step starts at the state x with the reference x_ref, and costs at most κ V(x − x_ref) if it starts in the certified set, the reference rests,
 //! the parameter keeps to a rate and no noise acts. κ, set and rate are those of what is proved of the design ([`BoundBasis`]): of the loop as it
-//! flies where the plant is linear, else of the LPV model with a controller in continuous time. V is bounded from above in interval arithmetic.
+//! flies where the plant is linear; of the nonlinear plant with a controller in continuous time where that is proved and the step starts in its
+//! small set; else of the LPV model, in continuous time too. V is bounded from above in interval arithmetic.
 //! That the parameter keeps to its rate no proof can know beforehand: the bound holds while it does.
 
-use super::claim::{Of, Verdict};
+use super::claim::{ClaimKind, Of, Verdict};
 use super::proof::{Proofs, SampledCost};
 use super::rest::{Unrest, rests_exactly, unrest};
 use super::{LyapunovFunction, unsaturated_level};
@@ -76,6 +77,18 @@ pub enum UnmetCondition {
     },
 }
 
+/// Which system a bound is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BoundOf {
+    /// The LPV model with a controller in continuous time.
+    Model,
+    /// The nonlinear plant with a saturating controller in continuous time: all but the sampling.
+    PlantInContinuousTime,
+    /// The plant as it flies: the loop that is sampled with zero-order hold and saturated.
+    Plant,
+}
+
 /// What a bound rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundBasis {
@@ -83,10 +96,10 @@ pub struct BoundBasis {
     pub factor: f64,
     /// Level of the set that a step has to start in; `None`: anywhere.
     pub level: Option<f64>,
-    /// Largest rate of the parameter, per second; 0 is at rest.
-    pub rate: f64,
-    /// The plant: the loop as it flies, sampled and saturated. The model: the LPV model with a controller in continuous time.
-    pub of: Of,
+    /// Largest rate of the parameter, per second, 0 at rest; `None`: whatever it is on the set.
+    pub rate: Option<f64>,
+    /// The system.
+    pub of: BoundOf,
 }
 
 impl BoundBasis {
@@ -94,7 +107,20 @@ impl BoundBasis {
     pub fn of_flight(design: &Design, sampled: &SampledCost) -> Option<Self> {
         let flies = design.controller.supervisor.is_none() && design.inner.is_empty();
         let factor = sampled.factor.filter(|_| flies)?;
-        Some(Self { factor, level: sampled.level, rate: 0.0, of: Of::Plant })
+        Some(Self { factor, level: sampled.level, rate: Some(0.0), of: BoundOf::Plant })
+    }
+
+    /// From the proofs about the nonlinear plant; `None` where its cost bound is not proved, or other gains fly too.
+    pub fn of_plant(design: &Design, proofs: &Proofs) -> Option<Self> {
+        let flies = design.controller.supervisor.is_none() && design.inner.is_empty();
+        proofs.claims.iter().filter(|claim| flies && claim.verdict == Verdict::Proved).find_map(|claim| {
+            match (claim.of, &claim.kind) {
+                (Of::Plant, &ClaimKind::Cost { factor, level: Some(level), .. }) => {
+                    Some(Self { factor, level: Some(level), rate: None, of: BoundOf::PlantInContinuousTime })
+                }
+                _ => None,
+            }
+        })
     }
 
     /// From the proofs about the LPV model; `None` where its cost bound is not proved, or other gains fly too.
@@ -102,7 +128,7 @@ impl BoundBasis {
         let flies = design.controller.supervisor.is_none() && design.inner.is_empty();
         let rate =
             proofs.cost_up_to.zip(proofs.stable_up_to).map(|(cost, stable)| cost.min(stable)).filter(|_| flies)?;
-        Some(Self { factor: proofs.cost_factor, level: proofs.level, rate, of: Of::Model })
+        Some(Self { factor: proofs.cost_factor, level: proofs.level, rate: Some(rate), of: BoundOf::Model })
     }
 
     /// What a design says of itself, in floating point.
@@ -123,7 +149,7 @@ impl BoundBasis {
             Some(_) => design.rate_bounded.as_ref().map_or(0.0, |bounded| bounded.rate),
             None => 0.0,
         };
-        Self { factor: 1.0, level, rate, of: Of::Model }
+        Self { factor: 1.0, level, rate: Some(rate), of: BoundOf::Model }
     }
 }
 
@@ -136,13 +162,13 @@ pub struct StepBound {
     pub value: f64,
     /// κ
     pub factor: f64,
-    /// The plant: of the loop as it flies, sampled and saturated. The model: of the LPV model with a controller in continuous time.
-    pub of: Of,
+    /// The system that it is of.
+    pub of: BoundOf,
     /// Level of the certified set; `None` where inputs are not limited and the set is everything.
     pub level: Option<f64>,
     /// V/level, rounded up.
     pub share: Option<f64>,
-    /// The bound holds while the parameter keeps to this rate, per second; `None` without a parameter.
+    /// The bound holds while the parameter keeps to this rate, per second; `None` without a parameter, or whatever its rate.
     pub while_rate: Option<f64>,
     /// The conditions that are not met.
     pub unmet: Vec<UnmetCondition>,
@@ -170,13 +196,14 @@ impl StepBound {
 
     /// Whether it is proved of the plant that flies, as it flies.
     pub fn is_guaranteed(&self) -> bool {
-        self.verdict == Verdict::Proved && self.of == Of::Plant
+        self.verdict == Verdict::Proved && self.of == BoundOf::Plant
     }
 }
 
-/// The bound of a step flown with `design` on the plant that it names. Without a `basis` nothing is proved of the design: κ = 1, and the level is
-/// γ for the saturated methods; for LPVQR with limited inputs it is [`unsaturated_level`], rounded down.
-pub fn step_bound(design: &Design, plant: &dyn Plant, basis: Option<&BoundBasis>, step: &StepConditions) -> StepBound {
+/// The bound of a step flown with `design` on the plant that it names, on the first of `bases` in whose set it starts, else on the last. Without one
+/// nothing is proved of the design: κ = 1, and the level is γ for the saturated methods; for LPVQR with limited inputs it is
+/// [`unsaturated_level`], rounded down.
+pub fn step_bound(design: &Design, plant: &dyn Plant, bases: &[BoundBasis], step: &StepConditions) -> StepBound {
     let description = plant.description();
     let scheduling = description.scheduling.as_ref();
     let rho = scheduling.map_or(0.0, |scheduling| step.state[scheduling.state]);
@@ -190,6 +217,8 @@ pub fn step_bound(design: &Design, plant: &dyn Plant, basis: Option<&BoundBasis>
         quadratic_form(&p, &error) + ROUNDING * quadratic_form(&absolute(&p), &sizes)
     });
     let unproved = || BoundBasis::unproved(design, plant, &lyapunov.matrix(rho), rho);
+    let holds = |basis: &&BoundBasis| basis.level.is_none_or(|level| value <= level);
+    let basis = bases.iter().find(holds).or(bases.last());
     let BoundBasis { factor, level, rate, of } = basis.copied().unwrap_or_else(unproved);
     let share = level.map(|level| (Interval::from(value) / level).hi());
 
@@ -214,14 +243,19 @@ pub fn step_bound(design: &Design, plant: &dyn Plant, basis: Option<&BoundBasis>
     };
     let parameter = ends.and_then(beyond).map(|value| UnmetCondition::ParameterOutside { value });
     let peak = step.peak_parameter_rate;
-    let allowed = if rate == 0.0 { REST_RATE } else { rate };
+    let allowed = match rate {
+        None => f64::INFINITY,
+        Some(0.0) => REST_RATE,
+        Some(rate) => rate,
+    };
     let moves = (peak.is_nan() || peak > allowed).then_some(UnmetCondition::ParameterMoves { rate: peak });
     let noise = step.noise.then_some(UnmetCondition::Noise);
     let unmet: Vec<UnmetCondition> =
         [reference, outside_limits, outside, parameter, moves, noise].into_iter().flatten().collect();
 
-    // of the model the reference is a point of rest by what a model is; of the plant it has to be one exactly
-    let is_exact = of == Of::Model || rests_exactly(plant, step.reference, input);
+    // of a model, and of what is derived from it, the reference is a point of rest by what an operating point is; of a linear plant it has to be
+    // one exactly
+    let is_exact = of != BoundOf::Plant || rests_exactly(plant, step.reference, input);
     let verdict = match (unmet.is_empty(), basis.is_some() && proved_value.is_some() && is_exact) {
         (false, _) => Verdict::Undecided,
         (true, true) => Verdict::Proved,
@@ -234,7 +268,7 @@ pub fn step_bound(design: &Design, plant: &dyn Plant, basis: Option<&BoundBasis>
         of,
         level,
         share,
-        while_rate: scheduling.map(|_| rate),
+        while_rate: scheduling.and(rate),
         unmet,
         verdict,
     }
