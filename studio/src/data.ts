@@ -118,8 +118,12 @@ export interface Run {
   /** The largest rate of the parameter for which set and cost bound are proved, 0 at rest; null where they are not. */
   proved_rate: number | null;
   outcome: Outcome;
-  /** Upper bound on the cost of this flight, or null; worth what its verdict says, under the condition in the note. */
+  /** Upper bound on the cost of this flight that is proved of the plant as it flies, sampled and saturated, or null. */
   guaranteed_cost: number | null;
+  /** The same of the nonlinear plant with a controller in continuous time, or null. */
+  plant_cost_bound: number | null;
+  /** The same of the LPV model with a controller in continuous time, where none is proved of the plant; worth what its verdict says, under the condition in the note. */
+  model_cost_bound: number | null;
   guaranteed_cost_verdict: Verdict;
   guaranteed_cost_note: string;
   actual_cost: number | null;
@@ -317,7 +321,7 @@ function checkRun(check: Checker, value: unknown, path: string, size: Sizes): vo
   if (!run) return;
   for (const key of ["id", "label", "controller", "certify_command", "guaranteed_cost_note"]) check.text(run[key], `${path}.${key}`);
   for (const key of ["color_index", "peak_input", "saturated_share"]) check.number(run[key], `${path}.${key}`);
-  for (const key of ["guaranteed_cost", "actual_cost", "settling_time_s", "proved_rate"]) check.numberOrNull(run[key], `${path}.${key}`);
+  for (const key of ["guaranteed_cost", "plant_cost_bound", "model_cost_bound", "actual_cost", "settling_time_s", "proved_rate"]) check.numberOrNull(run[key], `${path}.${key}`);
   check.verdict(run.verdict, `${path}.verdict`);
   check.verdict(run.guaranteed_cost_verdict, `${path}.guaranteed_cost_verdict`);
   check.list(run.claims, `${path}.claims`).forEach((item, i) => checkClaim(check, item, `${path}.claims[${i}]`));

@@ -12,7 +12,7 @@ const OF_FLIGHT: readonly string[] = ["step-cost", "step-stays", "rate-kept"];
 /** Claims about matrices at each parameter: no motion is in them. */
 const OF_MATRICES: readonly string[] = ["weights", "lyapunov-definite"];
 /** Claims about the loop as it is sampled. */
-const OF_SAMPLES: readonly string[] = ["sampled-stability", "sampled-invariance"];
+const OF_SAMPLES: readonly string[] = ["sampled-stability", "sampled-invariance", "sampled-cost"];
 /** What was asked for, and whether anything can be proved: no statement about a loop. */
 const OF_THE_PROOF: readonly string[] = ["as-asked", "provable"];
 
@@ -143,7 +143,8 @@ function facts(report: Report, claim: Claim): [string, Node | string][] {
 }
 
 function system(report: Report, claim: Claim): string {
-  if (isOfFlight(claim)) return claim.of === "plant" ? "this flight of the nonlinear plant" : "this flight, by the LPV model";
+  if (claim.premises.includes("sampled-cost")) return "this flight of the plant, sampled and saturated";
+  if (isOfFlight(claim)) return claim.of === "plant" ? "this flight of the plant, in continuous time" : `this flight, by the ${report.plant.linear ? "loop in continuous time" : "LPV model"}`;
   if (claim.kind === "weights") return "the weights of the cost";
   if (claim.of === "plant") return "the nonlinear plant";
   return report.plant.linear ? "the plant, which is linear" : "the LPV model of the nonlinear plant";
@@ -205,7 +206,8 @@ function conditions({ scheduling }: Report, claim: Claim): string[] {
 /** What the loop has around it, and the claim has not. */
 function surroundings({ report, run }: Context, claim: Claim): string[] {
   const hold = `Sampling: the claim is about a controller in continuous time, this one holds its inputs for ${about(report.sample_time_s)} s.`;
-  const between = claim.kind === "sampled-invariance" ? ["The motion between samples."] : claim.kind === "sampled-stability" ? [] : [hold];
+  const isSampled = ["sampled-stability", "sampled-cost"].includes(claim.kind) || claim.premises.includes("sampled-cost");
+  const between = claim.kind === "sampled-invariance" ? ["The motion between samples."] : isSampled ? [] : [hold];
   const isEstimated = run.estimation !== null || run.measurement !== null;
   return [
     ...between,

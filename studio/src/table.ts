@@ -54,7 +54,7 @@ function tableRow(report: Report, run: Run, unit: string, selection: Selection, 
     el("th", { scope: "row", class: "col-name" }, el("div", { class: "run-head" }, letterBadge(report, run, theme), name, lineSample(run, theme)), el("div", { class: "run-sub" }, run.controller)),
     cell("Design", "col-verdict", verdict),
     report.scheduling.parameter !== "" && cell(rateColumn(report), "num col-rate", ...provedRate(report, run)),
-    cell("Cost bound", "num col-bound", ...guaranteedCost(run)),
+    cell("Cost bound", "num col-bound", ...costBound(report, run)),
     cell("Actual cost", "num", ...actualCost(run)),
     cell("Settling time", "num", run.settling_time_s === null ? dash("not settled") : `${about(run.settling_time_s)} s`),
     cell("Peak input", "num", `${about(run.peak_input)} ${unit}`),
@@ -112,20 +112,41 @@ function setRate(run: Run): number | null {
   return rates.length === 0 ? null : Math.max(...rates);
 }
 
-/** A bound stands with what it is worth and under which condition, or not at all. */
-function guaranteedCost(run: Run): (Node | string)[] {
+/** A bound stands with the system it is of, what it is worth and under which condition, or not at all. */
+function costBound(report: Report, run: Run): (Node | string)[] {
   const note = run.guaranteed_cost_note;
-  if (run.guaranteed_cost === null) return [dash("no bound"), ...(note === "" ? [] : [el("div", { class: "run-sub" }, note)])];
-  const small = el("div", { class: "run-sub" }, el("span", { class: `word-${run.guaranteed_cost_verdict}` }, run.guaranteed_cost_verdict), note === "" ? "" : ` · ${note}`);
-  return [`≤ ${atMost(run.guaranteed_cost)}`, small];
+  const sub = (...children: (Node | string)[]): HTMLElement => el("div", { class: "run-sub" }, ...children);
+  const bound = shownBound(run);
+  if (bound === null) return [dash("no bound"), ...(note === "" ? [] : [sub(note)])];
+  const worth = sub(el("span", { class: `word-${run.guaranteed_cost_verdict}` }, run.guaranteed_cost_verdict), note === "" ? "" : ` · ${note}`);
+  const text = `≤ ${atMost(bound)}`;
+  if (run.guaranteed_cost !== null) return [text, worth];
+  if (run.plant_cost_bound !== null) return [text, el("div", { class: "run-sub", title: "It does not cover that the controller is sampled, or noise." }, "of the plant in continuous time"), worth];
+  return [text, el("div", { class: "run-sub", title: modelGaps(report) }, "of the model"), worth];
 }
 
-/** The cost of the flight; it may exceed a bound whose conditions the flight left, and then says so. */
+/** The bound that says most. */
+function shownBound(run: Run): number | null {
+  return run.guaranteed_cost ?? run.plant_cost_bound ?? run.model_cost_bound;
+}
+
+/** What a bound of the model does not cover. */
+function modelGaps(report: Report): string {
+  const linearisation = report.plant.linear ? "" : "what linearisation leaves out of the plant, ";
+  return `A bound of the ${report.plant.linear ? "loop" : "LPV model"} in continuous time. It does not cover ${linearisation}that the controller is sampled, or noise.`;
+}
+
+/** The cost of the flight; it may exceed a bound of the model, or one whose conditions the flight left, and then says so. */
 function actualCost(run: Run): (Node | string)[] {
   if (run.actual_cost === null) return [dash("no cost: the run did not complete")];
-  const exceeds = run.guaranteed_cost !== null && run.actual_cost > run.guaranteed_cost * (1 + 1e-9);
+  const bound = shownBound(run);
+  const exceeds = bound !== null && run.actual_cost > bound * (1 + 1e-9);
   const text = about(run.actual_cost);
-  return exceeds ? [text, el("div", { class: "run-sub outcome-bad", title: "The flight left the conditions under which the bound holds" }, "above bound")] : [text];
+  if (!exceeds) return [text];
+  if (run.guaranteed_cost !== null) return [text, el("div", { class: "run-sub outcome-bad", title: "The flight contradicts what is proved" }, "above bound")];
+  const isOfModel = run.plant_cost_bound === null;
+  const why = `The bound is ${isOfModel ? "of the model " : ""}in continuous time: it does not cover the ${isOfModel ? "plant" : "sampled loop"} that flies`;
+  return [text, el("div", { class: "run-sub outcome-bad", title: why }, isOfModel ? "above the bound of the model" : "above the bound in continuous time")];
 }
 
 function dash(why: string): HTMLElement {

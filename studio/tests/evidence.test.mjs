@@ -85,10 +85,11 @@ for (const [name, width, mode] of [["wide", 1440, "light"], ["wide-dark", 1440, 
 
     test("no bound on a cost is shown below what it is", async () => {
       for (const run of report.runs) {
-        if (run.guaranteed_cost === null) continue;
+        const cost = run.guaranteed_cost ?? run.plant_cost_bound ?? run.model_cost_bound;
+        if (cost === null) continue;
         const text = await rowOf(opened.page, run).locator(".col-bound").innerText();
         const shown = shownNumber(text.slice(text.indexOf("≤")));
-        assert.ok(shown >= run.guaranteed_cost && shown <= 1.0002 * run.guaranteed_cost, `${text} of ${run.guaranteed_cost}`);
+        assert.ok(shown >= cost && shown <= 1.0002 * cost, `${text} of ${cost}`);
       }
     });
 
@@ -200,6 +201,22 @@ describe("the fixture", LIMIT, () => {
       const text = await panelOf(page).innerText();
       for (const line of [/Counter-example at ψ = 0\.3 rad with ψ̇ = 2 rad\/s/, /r\s?x\s+1 m\n/, /φ\s+0\.1 rad/, /ψ\s+3\.1416 rad/]) assert.match(text, line);
       await page.locator(".table-panel").screenshot({ path: `${output}evidence-refuted.png` });
+    });
+  });
+
+  test("a bound names what it bounds, and says what it does not cover", async () => {
+    const report = makeReport({ duration_s: 2 });
+    const [flown, model] = report.runs;
+    Object.assign(flown, { guaranteed_cost: flown.actual_cost * 1.5, model_cost_bound: null, guaranteed_cost_of: "plant", guaranteed_cost_verdict: "proved" });
+    Object.assign(model, { guaranteed_cost: null, model_cost_bound: 1.3, actual_cost: 1.3595, guaranteed_cost_verdict: "numerical" });
+    await open("evidence-bounds", report, async (page) => {
+      const bound = (run) => rowOf(page, run).locator(".col-bound");
+      assert.doesNotMatch(await bound(flown).innerText(), /model/);
+      assert.match(await bound(flown).innerText(), /proved/);
+      assert.match(await bound(model).innerText(), /≤ 1\.3\s+of the model/);
+      assert.match(await bound(model).locator("[title]").first().getAttribute("title"), /does not cover what linearisation leaves out .* sampled/);
+      assert.match(await rowOf(page, model).innerText(), /above the bound of the model/);
+      assert.doesNotMatch(await rowOf(page, flown).innerText(), /above/);
     });
   });
 

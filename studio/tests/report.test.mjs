@@ -77,7 +77,9 @@ for (const screen of ["desktop", "phone"]) {
           const text = await rows.nth(i).innerText();
           assert.ok(text.includes(run.label), `row ${i} names ${run.label}`);
           const bound = await rows.nth(i).locator(".col-bound").innerText();
-          if (run.guaranteed_cost !== null) assert.ok(bound.includes(run.guaranteed_cost_verdict), `the bound of ${run.label} shows its verdict`);
+          const has = run.guaranteed_cost ?? run.plant_cost_bound ?? run.model_cost_bound;
+          if (has !== null) assert.ok(bound.includes(run.guaranteed_cost_verdict), `the bound of ${run.label} shows its verdict`);
+          assert.equal(/of the model/.test(bound.split("\n").slice(0, 2).join(" ")), run.model_cost_bound !== null, `the bound of ${run.label} names what it bounds`);
           if (run.outcome.kind === "diverged") assert.match(text, /diverged at/);
         }
       });

@@ -102,19 +102,23 @@ pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
 }
 
 /// Prove what can be proved of every design, and add it to its claims; what is only found of a frozen design, and not claimed,
-/// is added where it is proved. `None` where nothing can be proved of a design.
-pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign]) -> Vec<Option<Proofs>> {
+/// is added where it is proved. `None` where nothing can be proved of a design. With `nonlinear` also of the nonlinear plant, a finding as well.
+pub fn prove_all(scenario: &Scenario, checked: &mut [CheckedDesign], nonlinear: bool) -> Vec<Option<Proofs>> {
     let bar = progress::bar("prove", checked.len());
     let prove_one = |checked: &mut CheckedDesign| {
-        if let Some(proofs) = &checked.proofs {
+        if let Some(proofs) = checked.proofs.as_ref().filter(|_| !nonlinear) {
             // proved when it was designed
             bar.inc(1);
             return Some(proofs.members[0].clone());
         }
-        let proofs = prove(&checked.design, &*scenario.plant, &ProofOptions::default()).ok();
+        let options = ProofOptions { nonlinear, ..ProofOptions::default() };
+        let proofs = prove(&checked.design, &*scenario.plant, &options).ok();
         bar.inc(1);
         let told = |proofs: &Proofs| {
-            proofs.claims.iter().filter(|claim| proofs.is_counted(claim)).cloned().collect::<Vec<Claim>>()
+            let is_told = |claim: &&Claim| {
+                proofs.is_counted(claim) && (claim.of == Of::Model || claim.verdict == Verdict::Proved)
+            };
+            proofs.claims.iter().filter(is_told).cloned().collect::<Vec<Claim>>()
         };
         if let Some(proofs) = &proofs {
             checked.claims = merged(std::mem::take(&mut checked.claims), told(proofs));

@@ -1,10 +1,12 @@
 //! Flights of a scenario: simulation of each controller, and what its design says about each set-point step.
 
+use crate::failure::Failure;
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::{StepStay, step_stays};
 use lpv::certificate::{
-    Claim, ClaimKind, Excursion, LyapunovFunction, Of, Proofs, StepBound, StepConditions, SupervisedProofs,
-    UnmetCondition, Verdict, Words, excursion, step_bound,
+    BoundBasis, BoundOf, Claim, ClaimId, ClaimKind, Excursion, LyapunovFunction, Member, Of, Proofs, StepBound,
+    StepConditions, Subject, SupervisedProofs, UnmetCondition, Verdict, Words, excursion, prove_sampled_cost,
+    step_bound, unrest,
 };
 use lpv::math::decimal::{about, at_least, at_most};
 use lpv::model::linearize;
@@ -17,8 +19,10 @@ use std::time::Instant;
 /// Time between the samples at which it is looked whether a flight is beyond what its bound is for.
 const EXCURSION_STEP_S: f64 = 0.01;
 
-/// By this share a sampled controller may cost more than the bound of one in continuous time before the two are called a contradiction.
-const SAMPLING: f64 = 0.02;
+/// More than rounding adds to a cost that is summed up over millions of samples, relative to it.
+const ROUNDING: f64 = 1e-9;
+/// How often the integration steps are halved before a flight is said to contradict a bound.
+const HALVINGS: u32 = 6;
 
 /// A flown controller.
 pub struct Flown {
@@ -26,59 +30,95 @@ pub struct Flown {
     pub flight: Flight,
     /// Its figures of merit.
     pub performance: Performance,
-    /// What the design says of each step that was reached: a guarantee only where its verdict is `proved`; empty below a
-    /// governor, whose steps have no bound on their cost.
+    /// What is known of each step that was reached; empty below a governor, whose steps have no bound on their cost.
     pub bounds: Vec<StepBound>,
-    /// Which system the bounds are of: the LPV model, or the plant where that is linear.
-    pub bounds_are_of: Of,
+    /// Whether the steps are all of the flight: it rests before the first, and between two of them the reference does not change.
+    pub steps_are_all: bool,
+    /// A proved bound of the plant that the flight exceeds, in words.
+    pub contradiction: Option<String>,
     /// Whether each step stayed in the certified sets; empty of a controller that does not watch them.
     pub stays: Vec<StepStay>,
-    /// A claim for each of these.
+    /// What the bounds of a linear plant rest on, and a claim for each of bounds and stays.
     pub claims: Vec<Claim>,
     /// Seconds that it took.
     pub seconds: f64,
 }
 
-impl Flown {
-    /// What step `k` cost, up to the next one or the end of the flight: less than its cost to infinity.
-    fn cost_of_step(&self, k: usize) -> Option<f64> {
-        let trajectory = &self.flight.trajectory;
-        let at = |time_s: f64| {
-            let after = trajectory.time_s.partition_point(|&t| t < time_s - 1e-9);
-            trajectory.cost.get(after.min(trajectory.cost.len().checked_sub(1)?)).copied()
-        };
-        let steps = &self.performance.steps;
-        let end = steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
-        Some(at(end)? - at(steps.get(k)?.time_s)?)
-    }
+/// The cost of step `k` of a flight, up to the next one or the end: less than its cost to infinity.
+fn cost_of_step(trajectory: &Trajectory, performance: &Performance, k: usize) -> Option<f64> {
+    let at = |time_s: f64| {
+        let after = trajectory.time_s.partition_point(|&t| t < time_s - 1e-9);
+        trajectory.cost.get(after.min(trajectory.cost.len().checked_sub(1)?)).copied()
+    };
+    let end = performance.steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
+    Some(at(end)? - at(performance.steps.get(k)?.time_s)?)
+}
 
-    /// Whether step `k` costs more than its bound, whose conditions are all met, by more than a controller that is sampled explains: the
-    /// bound is one of continuous time.
+impl Flown {
+    /// Whether step `k` costs more than its bound, whose conditions are all met.
     pub fn exceeds(&self, k: usize) -> bool {
         let met = self.bounds.get(k).filter(|bound| bound.unmet.is_empty());
-        met.zip(self.cost_of_step(k)).is_some_and(|(bound, cost)| cost > bound.bound * (1.0 + SAMPLING))
+        let cost = cost_of_step(&self.flight.trajectory, &self.performance, k);
+        met.zip(cost).is_some_and(|(bound, cost)| cost > bound.bound * (1.0 + ROUNDING))
     }
 
-    /// A bound of the plant itself that this flight contradicts, in words.
-    pub fn contradiction(&self) -> Option<String> {
-        let k = (0..self.bounds.len()).find(|&k| self.bounds_are_of == Of::Plant && self.exceeds(k))?;
-        let (bound, cost) = (at_most(self.bounds[k].bound), about(self.cost_of_step(k)?));
-        Some(format!("the cost of step {} is bounded by {bound}, and the flight cost {cost}", k + 1))
+    /// Sum of the steps' cost bounds, if every step starts inside its certified set, with the worst verdict on them.
+    fn bound(&self) -> Option<(f64, Verdict)> {
+        let is_whole = self.steps_are_all && !self.bounds.is_empty();
+        let sum = || self.bounds.iter().map(|bound| bound.bound).fold(0.0, |sum: f64, bound| (sum + bound).next_up());
+        let sum = match self.bounds.as_slice() {
+            [one] => one.bound,
+            _ => sum(),
+        };
+        let worst = self.bounds.iter().map(|bound| bound.verdict).min()?;
+        (is_whole && self.bounds.iter().all(StepBound::is_inside)).then_some((sum, worst))
     }
 
-    /// Sum of the steps' cost bounds, if every step starts inside the certified set.
+    /// The bound that is proved of the plant as it flies, sampled and saturated.
     pub fn guaranteed_cost(&self) -> Option<f64> {
-        (self.bounds.iter().all(StepBound::is_inside) && !self.bounds.is_empty())
-            .then(|| self.bounds.iter().map(|bound| bound.bound).sum())
+        self.bound().filter(|_| self.bounds.iter().all(StepBound::is_guaranteed)).map(|(bound, _)| bound)
+    }
+
+    /// The bound of the nonlinear plant with a controller in continuous time, where that is proved of every step.
+    pub fn plant_cost_bound(&self) -> Option<f64> {
+        let is_of_plant =
+            |bound: &StepBound| bound.verdict == Verdict::Proved && bound.of == BoundOf::PlantInContinuousTime;
+        self.bound().filter(|_| self.bounds.iter().all(is_of_plant)).map(|(bound, _)| bound)
+    }
+
+    /// The bound of the LPV model with a controller in continuous time, where none is proved of the plant.
+    pub fn model_cost_bound(&self) -> Option<f64> {
+        let of_plant = self.guaranteed_cost().or(self.plant_cost_bound());
+        self.bound().filter(|_| of_plant.is_none()).map(|(bound, _)| bound)
+    }
+
+    /// What the one that there is is worth.
+    pub fn bound_verdict(&self) -> Verdict {
+        self.bound().map_or(Verdict::Undecided, |(_, verdict)| verdict)
+    }
+
+    /// Which system the bounds are of: the one that says least, where they are of several.
+    pub fn bounds_are_of(&self) -> BoundOf {
+        self.bounds.iter().map(|bound| bound.of).min().unwrap_or(BoundOf::Model)
     }
 }
 
-/// Fly every controller with its design, in parallel; with what is proved of supervised ones.
-pub fn fly_all(scenario: &Scenario, designs: &[(&Design, Option<&SupervisedProofs>)]) -> Vec<Flown> {
+/// A design to fly, with what is proved of it.
+pub struct Certified<'a> {
+    /// The design.
+    pub design: &'a Design,
+    /// Of each member of a supervised one.
+    pub supervised: Option<&'a SupervisedProofs>,
+    /// Of the design itself.
+    pub proofs: Option<&'a Proofs>,
+}
+
+/// Fly every controller with its design, in parallel.
+pub fn fly_all(scenario: &Scenario, designs: &[Certified]) -> Vec<Flown> {
     let bar = crate::progress::bar("fly", designs.len());
     let flights = (scenario.controllers.par_iter().zip(designs))
-        .map(|(plan, (design, proofs))| {
-            let flown = fly(scenario, plan, design, *proofs);
+        .map(|(plan, certified)| {
+            let flown = fly(scenario, plan, certified);
             bar.inc(1);
             flown
         })
@@ -87,9 +127,30 @@ pub fn fly_all(scenario: &Scenario, designs: &[(&Design, Option<&SupervisedProof
     flights
 }
 
-fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design, proofs: Option<&SupervisedProofs>) -> Flown {
+fn fly(scenario: &Scenario, plan: &ControllerPlan, certified: &Certified) -> Flown {
     let started = Instant::now();
-    let simulation = Simulation {
+    let &Certified { design, supervised, proofs } = certified;
+    let simulation = simulation(scenario, plan);
+    let flight = simulation.fly(&design.controller);
+    let performance = performance(scenario.plant.description(), &scenario.reference, &flight);
+    let seconds = started.elapsed().as_secs_f64();
+    let is_governed = !flight.trajectory.governed.is_empty();
+    let (bounds, mut claims) = match is_governed {
+        true => (Vec::new(), Vec::new()),
+        false => step_bounds(scenario, plan, design, proofs, &performance, &flight.trajectory),
+    };
+    let stays = step_stays(scenario, plan, design, supervised, &flight, &performance);
+    claims.extend(stays.iter().map(|stay| stay.claim.clone()));
+    let steps_are_all = steps_are_all(scenario, design, &performance);
+    let contradiction = None;
+    let mut flown = Flown { flight, performance, bounds, steps_are_all, contradiction, stays, claims, seconds };
+    flown.contradiction = contradiction_of(&flown, scenario, plan, &simulation, certified);
+    flown
+}
+
+/// The flight of a controller.
+fn simulation<'a>(scenario: &'a Scenario, plan: &ControllerPlan) -> Simulation<'a> {
+    Simulation {
         plant: &*scenario.plant,
         initial_state: scenario.initial_state.clone(),
         reference: scenario.reference.clone(),
@@ -102,19 +163,82 @@ fn fly(scenario: &Scenario, plan: &ControllerPlan, design: &Design, proofs: Opti
         estimate: plan.estimator,
         seed: scenario.seed,
         run: 0,
+    }
+}
+
+/// Whether the costs of the steps are the cost of the flight. The reference rests until the first one, and every change of it is a step that the
+/// flight reached.
+fn steps_are_all(scenario: &Scenario, design: &Design, performance: &Performance) -> bool {
+    let is_step = |time_s: f64| performance.steps.iter().any(|step| step.time_s == time_s);
+    let reference = &scenario.reference;
+    let first = performance.steps.first().map_or(f64::INFINITY, |step| step.time_s);
+    let input = &design.controller.operating_input;
+    let rests_before = first == 0.0 || unrest(&*scenario.plant, &reference.at(0.0), input).is_none();
+    let is_unchanged = |time_s: f64| time_s == 0.0 || reference.at(time_s) == reference.at(time_s - 1e-6);
+    rests_before && reference.step_times().into_iter().all(|time_s| is_step(time_s) || is_unchanged(time_s))
+}
+
+/// A step that costs more than is proved of the plant as it flies. It is flown again with ever shorter integration steps first, to be held against
+/// the bound from where it then starts: what is left of the integration's error, the change when the steps were halved last, is no contradiction.
+fn contradiction_of(
+    flown: &Flown,
+    scenario: &Scenario,
+    plan: &ControllerPlan,
+    simulation: &Simulation,
+    certified: &Certified,
+) -> Option<String> {
+    let exceeded = |k: &usize| flown.bounds[*k].is_guaranteed() && flown.steps_are_all && flown.exceeds(*k);
+    let k = (0..flown.bounds.len()).find(exceeded)?;
+    let trajectory = &flown.flight.trajectory;
+    let first = (flown.bounds[k].bound, cost_of_step(trajectory, &flown.performance, k)?);
+    let again = |steps_per_sample: usize| {
+        let finer = Simulation {
+            initial_state: simulation.initial_state.clone(),
+            reference: simulation.reference.clone(),
+            steps_per_sample,
+            ..*simulation
+        };
+        let flight = finer.fly(&certified.design.controller);
+        let performance = performance(scenario.plant.description(), &scenario.reference, &flight);
+        let trajectory = &flight.trajectory;
+        let (bounds, _) = step_bounds(scenario, plan, certified.design, certified.proofs, &performance, trajectory);
+        let bound = bounds.get(k).filter(|bound| bound.is_guaranteed())?.bound;
+        Some((bound, cost_of_step(trajectory, &performance, k)?))
     };
-    let flight = simulation.fly(&design.controller);
-    let performance = performance(scenario.plant.description(), &scenario.reference, &flight);
-    let seconds = started.elapsed().as_secs_f64();
-    let is_governed = !flight.trajectory.governed.is_empty();
-    let (bounds, mut claims) = match is_governed {
-        true => (Vec::new(), Vec::new()),
-        false => step_bounds(scenario, plan, design, &performance, &flight.trajectory),
-    };
-    let stays = step_stays(scenario, plan, design, proofs, &flight, &performance);
-    claims.extend(stays.iter().map(|stay| stay.claim.clone()));
-    let bounds_are_of = if scenario.is_linear() { Of::Plant } else { Of::Model };
-    Flown { flight, performance, bounds, bounds_are_of, stays, claims, seconds }
+    let (steps_per_sample, bound, cost) = confirmed(first, simulation.steps_per_sample, again)?;
+    let (bound, cost) = (at_most(bound), at_least(cost));
+    let words = format!("the cost of step {} is proved to be at most {bound}, and the flight cost {cost}", k + 1);
+    Some(format!("{words} ({steps_per_sample} integration steps a sample)"))
+}
+
+/// Whether a cost is still above its bound when the flight is integrated in more steps a sample: with their number, bound and cost then. `fly`
+/// gives bound and cost for a number of steps.
+fn confirmed(
+    (mut bound, mut cost): (f64, f64),
+    mut steps_per_sample: usize,
+    mut fly: impl FnMut(usize) -> Option<(f64, f64)>,
+) -> Option<(usize, f64, f64)> {
+    for _ in 0..HALVINGS {
+        steps_per_sample *= 2;
+        let again = fly(steps_per_sample)?;
+        let error = ((again.1 - again.0) - (cost - bound)).abs();
+        (bound, cost) = again;
+        let is_clear = (cost - bound).abs() > error + ROUNDING * bound;
+        if is_clear || error <= 0.1 * ROUNDING * bound {
+            break;
+        }
+    }
+    (cost > bound * (1.0 + ROUNDING)).then_some((steps_per_sample, bound, cost))
+}
+
+/// What is proved of the plant as it flies holds for its flight; else the program is wrong, and `command` shows it again.
+pub fn no_contradiction(scenario: &Scenario, flown: &[Flown], command: &str) -> Result<(), Failure> {
+    let found =
+        scenario.controllers.iter().zip(flown).find_map(|(plan, flown)| Some((plan, flown.contradiction.as_ref()?)));
+    found.map_or(Ok(()), |(plan, words)| {
+        let (name, seed) = (&plan.request.name, scenario.seed);
+        Err(Failure::Defect(format!("\"{name}\": {words}; to replay (seed {seed}): {command}")))
+    })
 }
 
 /// The bound of each step, with a claim that says which of its conditions are met.
@@ -122,42 +246,61 @@ fn step_bounds(
     scenario: &Scenario,
     plan: &ControllerPlan,
     design: &Design,
+    proofs: Option<&Proofs>,
     performance: &Performance,
     trajectory: &Trajectory,
 ) -> (Vec<StepBound>, Vec<Claim>) {
     let scheduling = scenario.plant.description().scheduling.as_ref();
     let states = &scenario.plant.description().states;
+    let (bases, mut claims) = bases(scenario, design, proofs);
     let bound = |(k, step): (usize, &StepResponse)| {
-        // what is asked for from the step on
-        let reference = scenario.reference.at(step.time_s + 0.5 * scenario.sample_time_s);
+        let sample = |time_s: f64| trajectory.time_s.partition_point(|&t| t < time_s - 1e-9);
+        let start = sample(step.time_s);
+        let end = performance.steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
+        let within = start..sample(end).max(start + 1);
+        let parameters = scheduling.iter().flat_map(|s| trajectory.states[within.clone()].iter().map(|x| x[s.state]));
+        let parameter_range = match scheduling {
+            None => [0.0; 2],
+            Some(_) => parameters
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]),
+        };
         let conditions = StepConditions {
-            error: &step.error,
-            reference: &reference,
-            parameter: step.parameter,
+            state: &trajectory.states[start],
+            reference: &trajectory.references[start],
+            parameter_range,
             peak_parameter_rate: step.peak_parameter_rate,
             noise: plan.noise,
         };
-        let bound = step_bound(design, &*scenario.plant, &conditions);
+        let bound = step_bound(design, &*scenario.plant, &bases, &conditions);
         let inside = match bound.level {
             None => "inputs are not limited, so the certified set is everything".to_owned(),
             Some(level) if bound.is_inside() => format!("inside the certified set of level {}", at_least(level)),
             Some(level) => {
                 let cover = cover(scenario, design, step, level);
-                format!("outside the certified set of level {}{cover}", at_least(level))
+                let share = at_most(bound.share.unwrap_or(f64::NAN));
+                format!("outside the certified set of level {}, V = {share} times that{cover}", at_least(level))
             }
         };
         let others = bound.unmet.iter().filter_map(|condition| match condition {
             UnmetCondition::Outside { .. } => None,
             UnmetCondition::ParameterMoves { rate } => {
                 let (parameter, unit) = scheduling.map_or(("", ""), |s| (s.parameter.as_str(), s.unit.as_str()));
-                let allowed = match &design.rate_bounded {
-                    None => "a parameter at rest".to_owned(),
-                    Some(bounded) => format!("rates up to {} {unit}/s", bounded.rate),
+                let allowed = match bound.while_rate {
+                    None | Some(0.0) => "a parameter at rest".to_owned(),
+                    Some(rate) => format!("rates up to {} {unit}/s", at_least(rate)),
                 };
                 Some(format!(
                     "; {parameter} moves at up to {} {unit}/s, and the bound is for {allowed}",
                     at_most(*rate)
                 ))
+            }
+            UnmetCondition::ParameterOutside { value } => {
+                let parameter = scheduling.map_or("", |s| s.parameter.as_str());
+                Some(format!("; {parameter} = {} is outside the range that the design is for", about(*value)))
+            }
+            UnmetCondition::InputOutside { input } => {
+                let name = &scenario.plant.description().inputs[*input].name;
+                Some(format!("; the input that holds the reference is outside the limits of {name}"))
             }
             UnmetCondition::Noise => Some("; noise acts, of which the bound knows nothing".into()),
             UnmetCondition::ReferenceMoves { state, rate } => {
@@ -168,21 +311,72 @@ fn step_bounds(
                 Some("; the reference rests where the plant is not the one of the model".into())
             }
         });
-        let end = performance.steps.get(k + 1).map_or(f64::INFINITY, |next| next.time_s);
         let beyond = excursions(scenario, design, trajectory, [step.time_s, end], bound.level);
         let kind = ClaimKind::StepCost { step: k + 1, time_s: step.time_s, bound: bound.bound };
-        let of = match scenario.is_linear() {
-            true => "",
-            false => "; a bound of the LPV model, which knows nothing of what linearisation leaves out",
+        let of = match bound.of {
+            BoundOf::Plant => "; of the loop as it flies, sampled and saturated",
+            BoundOf::PlantInContinuousTime => {
+                "; of the nonlinear plant with a controller in continuous time, which knows nothing of the sampling"
+            }
+            BoundOf::Model if scenario.is_linear() => {
+                "; a bound of the loop in continuous time, which knows nothing of the sampling"
+            }
+            BoundOf::Model => {
+                "; a bound of the LPV model in continuous time, which knows nothing of what linearisation leaves out"
+            }
+        };
+        let holds = while_rate(scenario, &bound).map_or(String::new(), |rate| format!("; holds {rate}"));
+        let worth = match bound.verdict {
+            Verdict::Numerical => "; evaluated in floating point",
+            _ => "",
         };
         let claim = Claim::new(kind, Of::Model, &Words::default()).decided(
-            bound.verdict(),
-            bound.level.map_or(f64::INFINITY, |level| level - bound.bound),
-            inside + of + &others.collect::<String>() + &beyond,
+            bound.verdict,
+            bound.level.map_or(f64::INFINITY, |level| level - bound.value),
+            inside + of + worth + &holds + &others.collect::<String>() + &beyond,
         );
-        (bound, if scenario.is_linear() { claim.of_plant() } else { claim })
+        let claim = if bound.of == BoundOf::Model { claim } else { claim.of_plant() };
+        let claim = Claim { premises: premises(&bases, bound.of), ..claim };
+        (bound, claim)
     };
-    performance.steps.iter().enumerate().map(bound).unzip()
+    let (bounds, of_steps): (Vec<StepBound>, Vec<Claim>) = performance.steps.iter().enumerate().map(bound).unzip();
+    claims.extend(of_steps);
+    (bounds, claims)
+}
+
+/// Under which motion of the parameter a bound holds, in words; `None` without a parameter.
+pub fn while_rate(scenario: &Scenario, bound: &StepBound) -> Option<String> {
+    let scheduling = scenario.plant.description().scheduling.as_ref()?;
+    let (parameter, unit) = (&scheduling.parameter, &scheduling.unit);
+    Some(match bound.while_rate? {
+        0.0 => format!("while {parameter} is at rest"),
+        rate => format!("while |d{parameter}/dt| <= {} {unit}/s", at_least(rate)),
+    })
+}
+
+/// What the bounds of steps rest on, the best first: of a linear plant the proof about the sampled loop, else what is proved of the nonlinear plant and
+/// of the LPV model. With the claims that are not among those about the design.
+fn bases(scenario: &Scenario, design: &Design, proofs: Option<&Proofs>) -> (Vec<BoundBasis>, Vec<Claim>) {
+    let sampled = scenario.is_linear().then(|| prove_sampled_cost(design, &*scenario.plant).ok()).flatten();
+    if let Some((sampled, basis)) = sampled.and_then(|s| BoundBasis::of_flight(design, &s).map(|basis| (s, basis))) {
+        let known = |claim: &Claim| proofs.is_some_and(|proofs| proofs.claims.iter().any(|c| c.id == claim.id));
+        let added = sampled.claims.into_iter().filter(|claim| !known(claim)).collect();
+        return (vec![basis], added);
+    }
+    let proved = proofs.map(|proofs| [BoundBasis::of_plant(design, proofs), BoundBasis::of_model(design, proofs)]);
+    (proved.into_iter().flatten().flatten().collect(), Vec::new())
+}
+
+/// The claim about the design that a bound of this system rests on, where it rests on one.
+fn premises(bases: &[BoundBasis], of: BoundOf) -> Vec<ClaimId> {
+    let (name, of_claim) = match of {
+        BoundOf::Plant => ("sampled-cost", Of::Model),
+        BoundOf::PlantInContinuousTime => ("cost", Of::Plant),
+        BoundOf::Model => ("cost", Of::Model),
+    };
+    let is_proved = bases.iter().any(|basis| basis.of == of);
+    let subject = Subject { of: of_claim, member: Member::Outer };
+    is_proved.then_some(ClaimId { name, subject }).into_iter().collect()
 }
 
 /// When and for how long a step was outside the set of this level, and faster than the rate of the design (a frozen design is
@@ -284,5 +478,40 @@ fn cover(scenario: &Scenario, design: &Design, step: &StepResponse, level: f64) 
         Ok(Some(gamma)) => format!("; SLPVQR with γ = {} would cover it", at_most(gamma)),
         Ok(None) => "; no γ up to 1e6 covers it".into(),
         Err(error) => format!("; which γ would cover it is not known: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::confirmed;
+
+    /// Of a method of order four the error falls sixteenfold with each halving.
+    fn integrated(exact: f64, error: f64) -> impl FnMut(usize) -> Option<(f64, f64)> {
+        move |steps| Some((1.0, exact + error * (steps as f64).powi(-4)))
+    }
+
+    #[test]
+    fn an_error_of_the_integration_is_no_contradiction() {
+        for error in [1e-8, 1e-4, 0.5] {
+            let mut fly = integrated(1.0 - 1e-12, error);
+            let first = fly(1).unwrap();
+            assert!(first.1 > first.0 * (1.0 + 1e-9), "what is flown first is above the bound");
+            assert_eq!(confirmed(first, 1, fly), None, "{error}");
+        }
+    }
+
+    #[test]
+    fn an_excess_is_confirmed_however_small() {
+        for (excess, error) in [(1e-7, 0.0), (1e-6, 1e-3), (0.01, 0.5), (0.01, -0.5), (3.0, 1e-9)] {
+            let mut fly = integrated(1.0 + excess, error);
+            let first = fly(1).unwrap();
+            let (steps, bound, cost) = confirmed(first, 1, fly).unwrap();
+            assert!(steps > 1 && bound == 1.0 && cost > 1.0 + 0.5 * excess, "{excess} {error}: {steps} {cost}");
+        }
+    }
+
+    #[test]
+    fn a_flight_that_has_no_bound_any_more_contradicts_none() {
+        assert_eq!(confirmed((1.0, 2.0), 1, |_| None), None);
     }
 }

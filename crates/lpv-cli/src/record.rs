@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::scenario::Scenario;
 use crate::stay::StepStay;
-use lpv::certificate::{Claim, Of, StepBound, Verdict, worst};
+use lpv::certificate::{BoundOf, Claim, StepBound, Verdict};
 use lpv::estimator::Consistency;
 use lpv::sim::{Outcome, Performance};
 use lpv::synthesis::Method;
@@ -105,12 +105,17 @@ pub struct ControllerRecord<'a> {
     /// The worst verdict on the design.
     verdict: Verdict,
     design_claims: &'a [Claim],
-    /// Sum of the steps' bounds; null when a step starts outside the certified set.
+    /// Sum of the steps' bounds where each is proved of the plant as it flies, sampled and saturated; else null.
     guaranteed_cost: Option<f64>,
-    /// The verdict on that bound, for this flight.
+    /// The same where each is proved of the nonlinear plant with a controller in continuous time.
+    plant_cost_bound: Option<f64>,
+    /// The same of the LPV model with a controller in continuous time; null where a step starts outside the certified set, or one of the
+    /// plant is proved.
+    model_cost_bound: Option<f64>,
+    /// The verdict on the one that there is, for this flight.
     guaranteed_cost_verdict: Verdict,
-    /// Which system the bound is of: the LPV model, or the plant that flies.
-    guaranteed_cost_of: Of,
+    /// Which system it is of.
+    guaranteed_cost_of: BoundOf,
     flight_claims: &'a [Claim],
     /// The bound of each step, with the conditions that it does not meet.
     step_bounds: &'a [StepBound],
@@ -138,8 +143,10 @@ impl<'a> RunRecord<'a> {
                 verdict: checked.verdict(),
                 design_claims: &checked.claims,
                 guaranteed_cost: flown.guaranteed_cost(),
-                guaranteed_cost_verdict: bound_verdict(checked, flown),
-                guaranteed_cost_of: flown.bounds_are_of,
+                plant_cost_bound: flown.plant_cost_bound(),
+                model_cost_bound: flown.model_cost_bound(),
+                guaranteed_cost_verdict: flown.bound_verdict(),
+                guaranteed_cost_of: flown.bounds_are_of(),
                 flight_claims: &flown.claims,
                 step_bounds: &flown.bounds,
                 step_stays: &flown.stays,
@@ -173,9 +180,4 @@ impl<'a> RunRecord<'a> {
         json.push('\n');
         Ok(json)
     }
-}
-
-/// The verdict on the cost bound of a flight: the worst of the design's claims and the flight's.
-pub fn bound_verdict(checked: &CheckedDesign, flown: &Flown) -> Verdict {
-    checked.verdict().min(worst(&flown.claims))
 }

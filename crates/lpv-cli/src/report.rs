@@ -2,11 +2,10 @@
 
 use crate::designs::{CheckedDesign, file_name};
 use crate::failure::Failure;
-use crate::flights::Flown;
-use crate::record::bound_verdict;
+use crate::flights::{Flown, while_rate};
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::StepStay;
-use lpv::certificate::{Claim, ClaimKind, Member, Motion, Of, StepBound, Subject, UnmetCondition, Verdict};
+use lpv::certificate::{BoundOf, Claim, ClaimKind, Member, Motion, Of, StepBound, Subject, UnmetCondition, Verdict};
 use lpv::math::decimal::{Rounding, at_most, decimal};
 use lpv::model::BoxWeights;
 use lpv::plant::{Description, Scene};
@@ -80,11 +79,16 @@ struct RunData<'a> {
     /// [`proved_rate`]
     proved_rate: Option<f64>,
     outcome: OutcomeData,
+    /// Of the plant as it flies.
     guaranteed_cost: Option<f64>,
+    /// Of the nonlinear plant with a controller in continuous time.
+    plant_cost_bound: Option<f64>,
+    /// Of the LPV model with a controller in continuous time.
+    model_cost_bound: Option<f64>,
     guaranteed_cost_verdict: Verdict,
     guaranteed_cost_note: String,
-    /// Which system the bound is of: the LPV model, or the plant that flies.
-    guaranteed_cost_of: Of,
+    /// Which system the bound is of.
+    guaranteed_cost_of: BoundOf,
     actual_cost: Option<f64>,
     settling_time_s: Option<f64>,
     peak_input: f64,
@@ -150,7 +154,7 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
     let mut runs: Vec<RunData> = (scenario.controllers.iter().zip(designs).zip(flights).enumerate())
         .map(|(k, ((plan, checked), flown))| RunData {
             certify_command: certify_command(folder, &plan.request.name),
-            ..run(description, &shown, weights.as_ref(), k, plan, checked, flown)
+            ..run(scenario, &shown, weights.as_ref(), k, plan, checked, flown)
         })
         .collect();
     // what is proved leads: flight and all, then the design alone. Letters follow; colours stay those of the scenario
@@ -197,7 +201,7 @@ fn is_output(description: &Description, state: usize) -> bool {
 }
 
 fn run<'a>(
-    description: &Description,
+    scenario: &'a Scenario,
     shown: &[usize],
     weights: Option<&BoxWeights>,
     index: usize,
@@ -205,6 +209,7 @@ fn run<'a>(
     checked: &'a CheckedDesign,
     flown: &'a Flown,
 ) -> RunData<'a> {
+    let description = scenario.plant.description();
     let trajectory = &flown.flight.trajectory;
     let limits = &plan.request.limits;
     let (states, inputs, outputs) = (description.states.len(), description.inputs.len(), description.outputs.len());
@@ -234,9 +239,11 @@ fn run<'a>(
             },
         },
         guaranteed_cost: flown.guaranteed_cost(),
-        guaranteed_cost_verdict: bound_verdict(checked, flown),
-        guaranteed_cost_note: bound_note(flown),
-        guaranteed_cost_of: flown.bounds_are_of,
+        plant_cost_bound: flown.plant_cost_bound(),
+        model_cost_bound: flown.model_cost_bound(),
+        guaranteed_cost_verdict: flown.bound_verdict(),
+        guaranteed_cost_note: bound_note(scenario, flown),
+        guaranteed_cost_of: flown.bounds_are_of(),
         actual_cost: flown.performance.actual_cost,
         settling_time_s: flown.performance.settling_time_s,
         peak_input: flown.performance.peak_input,
@@ -334,7 +341,7 @@ fn estimation_errors(description: &Description, shown: &[usize], trajectory: &Tr
 }
 
 /// What the bound of a flight is worth, in a few words: step by step where there are several.
-pub fn bound_note(flown: &Flown) -> String {
+pub fn bound_note(scenario: &Scenario, flown: &Flown) -> String {
     if flown.bounds.is_empty() && !flown.stays.is_empty() {
         // below a governor: no bound on the cost, but a certificate of where the error stays
         let steps = flown.stays.iter().enumerate();
@@ -345,34 +352,50 @@ pub fn bound_note(flown: &Flown) -> String {
         };
         return steps.map(spell).collect::<Vec<_>>().join("; ");
     }
-    let worth = |bound: &StepBound| {
-        let unmet: Vec<&str> = (bound.unmet.iter())
-            .map(|condition| match condition {
-                UnmetCondition::Outside { .. } => "outside",
-                UnmetCondition::ParameterMoves { .. } => "parameter moves",
-                UnmetCondition::Noise => "noise",
-                UnmetCondition::ReferenceMoves { .. } | UnmetCondition::ReferenceElsewhere => "reference not at rest",
-            })
-            .collect();
-        unmet.join(", ")
+    // under which motion, what is not met, and whether the flight did better
+    let remarks = |k: usize| -> Vec<String> {
+        let bound = &flown.bounds[k];
+        let holds = (bound.verdict == Verdict::Proved).then(|| while_rate(scenario, bound)).flatten();
+        let beyond = flown.exceeds(k).then(|| "exceeded by the flight".to_owned());
+        holds.into_iter().chain(bound.unmet.iter().map(unmet_words)).chain(beyond).collect()
     };
     match flown.bounds.as_slice() {
         [] => "no step".into(),
-        [one] if flown.exceeds(0) => {
-            [worth(one), "exceeded by the flight".to_owned()].join(", ").trim_start_matches(", ").into()
-        }
-        [one] => worth(one),
+        [_] => remarks(0).join(", "),
         steps => {
-            let of = if flown.bounds_are_of == Of::Model { " of the model" } else { "" };
-            let spell = |(k, bound): (usize, &StepBound)| match bound.verdict() {
-                Verdict::Numerical | Verdict::Proved => {
-                    let beyond = if flown.exceeds(k) { ", exceeded by the flight" } else { "" };
-                    format!("step {} ≤ {}{of} {}{beyond}", k + 1, at_most(bound.bound), bound.verdict().word())
+            let spell = |(k, bound): (usize, &StepBound)| {
+                let system = system_word(bound.of);
+                let remarks = remarks(k).join(", ");
+                match bound.verdict {
+                    Verdict::Undecided | Verdict::Refuted => format!("step {} {remarks}", k + 1),
+                    verdict if remarks.is_empty() => {
+                        format!("step {} {system} {} {}", k + 1, at_most(bound.bound), verdict.word())
+                    }
+                    verdict => format!("step {} {system} {} {} {remarks}", k + 1, at_most(bound.bound), verdict.word()),
                 }
-                Verdict::Undecided | Verdict::Refuted => format!("step {} {}", k + 1, worth(bound)),
             };
             steps.iter().enumerate().map(spell).collect::<Vec<_>>().join("; ")
         }
+    }
+}
+
+/// Of which system a bound is, in front of it.
+pub fn system_word(of: BoundOf) -> &'static str {
+    match of {
+        BoundOf::Plant => "≤",
+        BoundOf::PlantInContinuousTime => "plant in continuous time: ≤",
+        BoundOf::Model => "model: ≤",
+    }
+}
+
+fn unmet_words(condition: &UnmetCondition) -> String {
+    match condition {
+        UnmetCondition::Outside { share, .. } => format!("outside (V = {} γ)", decimal(*share, 3, Rounding::Up)),
+        UnmetCondition::ParameterMoves { .. } => "parameter moves".into(),
+        UnmetCondition::ParameterOutside { .. } => "parameter outside its range".into(),
+        UnmetCondition::Noise => "noise".into(),
+        UnmetCondition::ReferenceMoves { .. } | UnmetCondition::ReferenceElsewhere => "reference not at rest".into(),
+        UnmetCondition::InputOutside { .. } => "held by an input outside its limits".into(),
     }
 }
 
@@ -422,7 +445,11 @@ fn supervision_words(plan: &ControllerPlan) -> String {
 fn notes(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> Vec<String> {
     let mut notes = vec![
         "Sign convention: u = u* − sat(K(ρ)(x − x_ref)).".to_string(),
-        "Bounds on costs are numerical: they hold in floating point at the grid points, for a parameter at rest, or within the rate that a design was made for.".into(),
+        match scenario.is_linear() {
+            true => "A guaranteed cost is proved of the loop as it flies, sampled with zero-order hold and saturated. A bound of the model is one of the loop in continuous time, which does not cover the sampling.",
+            false => "A bound of the model is one of the LPV model with a controller in continuous time: it covers neither what linearisation leaves out nor the sampling. It holds for a parameter at rest, or within the rate that is named; where it is not called proved it was evaluated in floating point at the grid points.",
+        }
+        .to_owned(),
     ];
     if designs.iter().any(|checked| checked.proofs.is_some()) {
         notes.push("A certified step is proved for the LPV model: every claim of the design holds for every parameter value at the rate used, and this flight of the nonlinear plant stayed in the set and within the rate. The proof does not cover what linearisation leaves out; V/γ shows how much room that took.".into());

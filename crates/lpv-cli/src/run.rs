@@ -2,7 +2,7 @@
 
 use crate::designs::{self, CheckedDesign};
 use crate::failure::Failure;
-use crate::flights;
+use crate::flights::{self, Certified};
 use crate::folder::ResultFolder;
 use crate::output::{OutputArguments, print};
 use crate::record::{RunRecord, trajectory_csv, trajectory_file_name};
@@ -21,6 +21,9 @@ pub struct RunArguments {
     /// Also prove the designs over the whole range of the parameter, and compare the proved rates with the flown ones
     #[arg(long)]
     prove: bool,
+    /// The same, and of the nonlinear plant on the largest set that can be proved (takes longer)
+    #[arg(long)]
+    nonlinear: bool,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -32,11 +35,17 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let place = scenario.result_folder(arguments.output.out.as_deref());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
     let mut checked = designs::design_all(&scenario)?;
-    let proofs = match arguments.prove {
-        true => designs::prove_all(&scenario, &mut checked),
+    let proofs = match arguments.prove || arguments.nonlinear {
+        true => designs::prove_all(&scenario, &mut checked, arguments.nonlinear),
         false => checked.iter().map(|checked| Some(checked.proofs.as_ref()?.members[0].clone())).collect(),
     };
-    let certified: Vec<_> = checked.iter().map(|checked| (&checked.design, checked.proofs.as_ref())).collect();
+    let certified: Vec<Certified> = (checked.iter().zip(&proofs))
+        .map(|(checked, proofs)| Certified {
+            design: &checked.design,
+            supervised: checked.proofs.as_ref(),
+            proofs: proofs.as_ref(),
+        })
+        .collect();
     let mut flown = flights::fly_all(&scenario, &certified);
     for (flown, proofs) in flown.iter_mut().zip(&proofs) {
         if let Some(proofs) = proofs {
@@ -63,20 +72,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             place.join("report.html").display()
         ))?;
     }
-    no_contradiction(&arguments.scenario, &scenario, &flown)?;
+    let replay = format!("lpv run {} --force", arguments.scenario.display());
+    flights::no_contradiction(&scenario, &flown, &replay)?;
     required_verdicts(&scenario, &checked)
-}
-
-/// A bound on the plant that flies, all of whose conditions are met, holds for its flight; else the program is wrong.
-fn no_contradiction(file: &std::path::Path, scenario: &Scenario, flown: &[flights::Flown]) -> Result<(), Failure> {
-    let found = scenario.controllers.iter().zip(flown).find_map(|(plan, flown)| Some((plan, flown.contradiction()?)));
-    found.map_or(Ok(()), |(plan, words)| {
-        let (name, seed) = (&plan.request.name, scenario.seed);
-        Err(Failure::Defect(format!(
-            "\"{name}\": {words}; to replay (seed {seed}): lpv run {} --force",
-            file.display()
-        )))
-    })
 }
 
 /// The verdicts that the scenario requires; a refuted design is never what was asked for.

@@ -2,7 +2,7 @@
 
 use crate::designs;
 use crate::failure::Failure;
-use crate::flights::{self, Flown};
+use crate::flights::{self, Certified, Flown};
 use crate::folder::ResultFolder;
 use crate::output::{OutputArguments, print};
 use crate::record::{trajectory_csv, trajectory_file_name};
@@ -34,6 +34,8 @@ struct FlightSummary<'a> {
     #[serde(flatten)]
     performance: &'a Performance,
     guaranteed_cost: Option<f64>,
+    plant_cost_bound: Option<f64>,
+    model_cost_bound: Option<f64>,
     claims: &'a [Claim],
     estimator_consistency: Option<&'a Consistency>,
     seconds: f64,
@@ -71,7 +73,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     }
     let place = arguments.output.out.clone().unwrap_or_else(|| scenario.flights_folder());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
-    let unproved: Vec<_> = loaded.iter().map(|design| (design, None)).collect();
+    let unproved: Vec<Certified> =
+        loaded.iter().map(|design| Certified { design, supervised: None, proofs: None }).collect();
     let flown = flights::fly_all(&scenario, &unproved);
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {
         folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
@@ -95,7 +98,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         }
         print(&place.display().to_string())?;
     }
-    Ok(())
+    let replay = format!("lpv simulate {} --designs {} --force", arguments.scenario.display(), source.display());
+    flights::no_contradiction(&scenario, &flown, &replay)
 }
 
 fn summary<'a>(name: &'a str, flown: &'a Flown) -> FlightSummary<'a> {
@@ -104,6 +108,8 @@ fn summary<'a>(name: &'a str, flown: &'a Flown) -> FlightSummary<'a> {
         outcome: &flown.flight.outcome,
         performance: &flown.performance,
         guaranteed_cost: flown.guaranteed_cost(),
+        plant_cost_bound: flown.plant_cost_bound(),
+        model_cost_bound: flown.model_cost_bound(),
         claims: &flown.claims,
         estimator_consistency: flown.flight.consistency.as_ref(),
         seconds: flown.seconds,

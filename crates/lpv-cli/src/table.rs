@@ -2,10 +2,9 @@
 
 use crate::designs::CheckedDesign;
 use crate::flights::Flown;
-use crate::record::bound_verdict;
-use crate::report::bound_note;
+use crate::report::{bound_note, system_word};
 use crate::scenario::Scenario;
-use lpv::certificate::Of;
+use lpv::certificate::BoundOf;
 use lpv::math::decimal::{at_most, fixed};
 use lpv::sim::Outcome;
 
@@ -20,14 +19,17 @@ pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flo
     for ((plan, checked), flown) in scenario.controllers.iter().zip(designs).zip(flights) {
         let performance = &flown.performance;
         let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |value| fixed(value, digits));
-        let note = bound_note(flown);
-        let verdict = bound_verdict(checked, flown).word();
-        let of = if flown.bounds_are_of == Of::Model { " of the model" } else { "" };
-        let bound = match (flown.guaranteed_cost(), note.is_empty()) {
-            (Some(bound), true) => format!("{}{of} ({verdict})", at_most(bound)),
-            (Some(bound), false) => format!("{}{of} ({verdict}: {note})", at_most(bound)),
-            (None, _) => note,
-        };
+        let note = bound_note(scenario, flown);
+        let verdict = flown.bound_verdict().word();
+        let worth = if note.is_empty() { format!("({verdict})") } else { format!("({verdict}: {note})") };
+        let bounds = [
+            (BoundOf::Plant, flown.guaranteed_cost()),
+            (BoundOf::PlantInContinuousTime, flown.plant_cost_bound()),
+            (BoundOf::Model, flown.model_cost_bound()),
+        ];
+        let bound =
+            bounds.into_iter().find_map(|(of, bound)| Some(format!("{} {} {worth}", system_word(of), at_most(bound?))));
+        let bound = bound.unwrap_or(note);
         rows.push(vec![
             plan.label.clone(),
             checked.verdict().word().to_owned(),

@@ -7,5 +7,6 @@ mod run;
 mod sdp;
 mod soundness;
 mod stages;
+mod step_bounds;
 mod thesis;
 mod transformation;

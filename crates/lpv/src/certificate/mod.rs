@@ -5,24 +5,26 @@
 //! `numerical`; [`prove`] proves over the whole range of the parameter.
 
 mod claim;
+mod excursion;
 mod inequality;
+mod lyapunov;
 mod proof;
-mod region;
 mod rest;
 mod stability;
+mod step;
 mod supervised;
 
 pub use claim::{Claim, ClaimId, ClaimKind, Member, Motion, Of, Subject, Verdict, Witness, Words, settle, worst};
+pub use excursion::{Excursion, excursion};
 pub use inequality::{BlockMargin, block_margins};
+pub use lyapunov::{LyapunovFunction, unsaturated_level};
 pub use proof::{
     COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Record,
-    RecordError, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic,
+    RecordError, SampledCost, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic, prove_sampled_cost,
 };
-pub use region::{
-    Excursion, LyapunovFunction, StepBound, StepConditions, UnmetCondition, excursion, step_bound, unsaturated_level,
-};
-pub use rest::{Unrest, unrest};
+pub use rest::{Unrest, rests_exactly, unrest};
 pub use stability::{StabilityMargin, frozen_stability};
+pub use step::{BoundBasis, BoundOf, StepBound, StepConditions, UnmetCondition, step_bound};
 pub use supervised::{SupervisedProofs, prove_supervised};
 
 use crate::math::decimal::{Rounding, about, decimal};

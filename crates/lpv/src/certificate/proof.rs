@@ -22,8 +22,10 @@ mod record;
 mod rowwise;
 mod sampled;
 mod sampled_constant;
+mod sampled_cost;
 mod sampled_saturated;
 mod sampled_spectrum;
+mod value;
 mod weights;
 mod witness;
 
@@ -35,6 +37,7 @@ pub(super) use motion::prove_motion;
 pub use nonlinear::NonlinearProof;
 pub use polytopic::{PolytopicClaim, PolytopicLyapunov, prove_polytopic};
 pub use record::{Record, RecordError};
+pub use sampled_cost::{SampledCost, prove_sampled_cost};
 
 use super::claim::{Claim, ClaimKind, Of, Verdict, Witness, Words, settle};
 use crate::math::decimal::{about, at_least};
@@ -277,7 +280,9 @@ impl Proofs {
     /// is a finding, and counts if it is proved.
     pub fn is_counted(&self, claim: &Claim) -> bool {
         let is_decided = matches!(claim.verdict, Verdict::Proved | Verdict::Refuted);
-        self.asked || is_decided || matches!(claim.kind, ClaimKind::AsAsked { .. })
+        // a factor is looked for, none is claimed
+        let is_asked = self.asked && !matches!(claim.kind, ClaimKind::SampledCost { .. });
+        is_asked || is_decided || matches!(claim.kind, ClaimKind::AsAsked { .. })
     }
 }
 
@@ -289,7 +294,8 @@ impl Proofs {
 ///    invariant;
 /// 4. the cost is at most V(x(0)) times a factor for |ρ̇| ≤ r;
 /// 5. the loop with zero-order hold at the design's sample time is stable at every fixed ρ, while no input saturates;
-/// 6. where it is asked for, the largest set {V ≤ c} that is invariant for the nonlinear plant.
+/// 6. of a plant without a parameter, the cost of the saturated loop with zero-order hold is at most κ V(x(0)), for the least κ found;
+/// 7. where it is asked for, the largest set {V ≤ c} that is invariant for the nonlinear plant.
 pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Result<Proofs, Unprovable> {
     let closed_loop = ClosedLoop::new(design, plant)?;
     let words = words(plant);
@@ -351,6 +357,9 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
     }
     claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
     claims.extend(level.map(|level| sampled_saturated::prove(&closed_loop, &words, level, design.sample_time_s)));
+    if !closed_loop.has_parameter {
+        claims.push(sampled_cost::claim(&closed_loop, &words, level, design.sample_time_s));
+    }
     let mut nonlinear = None;
     if options.nonlinear {
         let (found, proof) = nonlinear::prove(&closed_loop, &words, level);

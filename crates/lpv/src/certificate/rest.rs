@@ -4,6 +4,7 @@
 //! it may differ from zero by what rounding leaves of terms that cancel, a part in 10¹² of Σ|∂fᵢ/∂xⱼ xⱼ| + Σ|∂fᵢ/∂uⱼ uⱼ|, and by nothing
 //! where there are no such terms.
 
+use crate::math::definite::is_zero_sum;
 use crate::math::interval::Interval;
 use crate::math::taylor::Taylor;
 use crate::plant::Plant;
@@ -57,4 +58,26 @@ pub fn unrest(plant: &dyn Plant, reference: &[f64], input: &[f64]) -> Option<Unr
         here.iter().zip(there).any(|(a, b)| is_far((a.value - b.value).magnitude()))
     };
     (differs(&a, &a_there) || differs(&b, &b_there)).then_some(Unrest::Elsewhere)
+}
+
+/// Whether Ax_ref + Bu is zero to the last bit, of a linear plant whose A and B are known exactly. Rounding takes nothing: the sums are those of
+/// integers.
+pub fn rests_exactly(plant: &dyn Plant, reference: &[f64], input: &[f64]) -> bool {
+    let points =
+        |values: &[f64]| values.iter().map(|&value| Taylor::constant(Interval::point(value))).collect::<Vec<_>>();
+    let (a, b) = plant.jacobians_over(&points(reference), &points(input));
+    let n = reference.len();
+    let m = input.len();
+    (0..n).all(|i| {
+        let of = |entries: &[Taylor], values: &[f64], width: usize| -> Option<Vec<(f64, f64)>> {
+            let factors = entries[i * width..(i + 1) * width].iter().zip(values);
+            let exact = |(entry, &value): (&Taylor, &f64)| {
+                let entry = entry.value;
+                (entry.lo() == entry.hi() && value.is_finite()).then_some((entry.lo(), value))
+            };
+            factors.map(exact).collect()
+        };
+        let products = of(&a, reference, n).zip(of(&b, input, m));
+        products.is_some_and(|(state, input)| is_zero_sum(&[state, input].concat()))
+    })
 }

@@ -110,6 +110,21 @@ pub(super) fn eliminated(mut m: Vec<Vec<BigInt>>) -> Definiteness {
     Definiteness::Positive
 }
 
+/// Whether Σ xy of pairs (x, y) is zero, exactly; with a pair that is not finite it is not.
+pub fn is_zero_sum(pairs: &[(f64, f64)]) -> bool {
+    if pairs.iter().any(|(x, y)| !(x.is_finite() && y.is_finite())) {
+        return false;
+    }
+    let product = |&(x, y): &(f64, f64)| {
+        let ((m, e), (n, f)) = (parts(x), parts(y));
+        (BigInt::from(m) * n, e + f)
+    };
+    let products: Vec<(BigInt, i64)> = pairs.iter().filter(|(x, y)| *x != 0.0 && *y != 0.0).map(product).collect();
+    let least = products.iter().map(|(_, e)| *e).min().unwrap_or(0);
+    let sum: BigInt = products.into_iter().map(|(m, e)| m << (e - least)).sum();
+    sum == BigInt::from(0)
+}
+
 /// The first pair (i, j), i < j, whose entries differ, compared as numbers.
 pub fn asymmetry(matrix: &Mat<f64>) -> Option<(usize, usize)> {
     let n = matrix.nrows().min(matrix.ncols());
@@ -151,6 +166,18 @@ mod tests {
         assert_eq!(of(&[&[large, 1.0], &[1.0, small.next_up()]]), Some(Positive));
         assert_eq!(of(&[&[1.0, 0.0], &[0.0, -20.0]]), Some(Indefinite));
         assert_eq!(definiteness(&identity(64)), Some(Positive));
+    }
+
+    #[test]
+    fn sums_of_products_are_exact() {
+        assert!(is_zero_sum(&[]) && is_zero_sum(&[(0.0, 1.0), (-0.0, 3.0)]));
+        // the double 0.1 is not a third of the double 0.3
+        assert!(!is_zero_sum(&[(0.1, 3.0), (-0.3, 1.0)]) && is_zero_sum(&[(0.1, 4.0), (-0.4, 1.0)]));
+        assert!(is_zero_sum(&[(1e300, 1e300), (-1e300, 1e300)]) && !is_zero_sum(&[(1e-300, 1e-300)]));
+        assert!(!is_zero_sum(&[(1.0, 1.0), (-1.0, 1.0_f64.next_up())]));
+        // in floating point this sum is zero
+        assert!(!is_zero_sum(&[(1.0, 1e30), (1.0, 1.0), (-1.0, 1e30)]));
+        assert!(!is_zero_sum(&[(f64::NAN, 0.0)]) && !is_zero_sum(&[(f64::INFINITY, 0.0)]));
     }
 
     proptest! {

@@ -67,6 +67,16 @@ pub enum ClaimKind {
         /// T, s.
         sample_time_s: f64,
     },
+    /// With zero-order hold and saturation the cost is at most `factor` V(x(0)), from x(0) in {V ≤ γ} where there is a level: of the loop as
+    /// it flies, without a parameter.
+    SampledCost {
+        /// κ; infinite where none is found.
+        factor: f64,
+        /// γ; `None` where the bound holds from everywhere.
+        level: Option<f64>,
+        /// T, s.
+        sample_time_s: f64,
+    },
     /// The governed reference is a motion of the model, up to what the sets absorb.
     GovernedMotion {
         /// States that it moves.
@@ -131,6 +141,7 @@ impl ClaimKind {
             Self::Cost { .. } => "cost",
             Self::SampledStability { .. } => "sampled-stability",
             Self::SampledInvariance { .. } => "sampled-invariance",
+            Self::SampledCost { .. } => "sampled-cost",
             Self::GovernedMotion { .. } => "governed-motion",
             Self::InducedGain { .. } => "induced-gain",
             Self::AsAsked { what, .. } => match *what {

@@ -50,6 +50,14 @@ impl ClaimKind {
                 "the saturated loop sampled at T = {sample_time_s} s keeps {v} <= {} invariant{fixed}",
                 at_least(*level)
             ),
+            Self::SampledCost { factor, level, sample_time_s } => {
+                let from = level.map_or(String::new(), |level| format!(" from {v} <= {}", at_least(level)));
+                let bound = match factor.is_finite() {
+                    true => format!("at most {} {}", at_most(*factor), of_the_start(v)),
+                    false => format!("bounded by a multiple of {}", of_the_start(v)),
+                };
+                format!("the cost of the saturated loop sampled at T = {sample_time_s} s is {bound}{from}")
+            }
             Self::GovernedMotion { states, farthest } => format!(
                 "the governed reference moves as the model does (moves of {} by up to {farthest}, of angles by half a turn)",
                 states.join(", ")
