@@ -264,7 +264,7 @@ impl<'a> ClosedLoop<'a> {
     }
 
     /// S of a mixture, and K; in the inverse form SY and KY.
-    fn gains(&self, k: TaylorMatrix, mixture: usize, t: Taylor) -> [TaylorMatrix; 2] {
+    pub fn gains(&self, k: TaylorMatrix, mixture: usize, t: Taylor) -> [TaylorMatrix; 2] {
         let rho = self.rho(t);
         let high = match &self.form {
             Form::Direct(_) => k,
@@ -351,6 +351,12 @@ impl<'a> ClosedLoop<'a> {
         Decrease::new(&over, &middle)
     }
 
+    /// P or Y.
+    pub fn lyapunov(&self, t: Taylor) -> TaylorMatrix {
+        let (Form::Direct(function) | Form::Inverse(function)) = &self.form;
+        TaylorMatrix::of_function(function, self.rho(t))
+    }
+
     /// P or Y on the cell; bordered by a row f and a bound b² where one is asked for (5.21): its positivity is (fx)² < b²
     /// on V ≤ 1.
     pub fn bordered(&self, place: &Place, border: Option<(Row, Interval)>) -> CellMatrix {
@@ -366,10 +372,8 @@ impl<'a> ClosedLoop<'a> {
     }
 
     fn bordered_at(&self, piece: usize, border: Option<(Row, Interval)>, t: Taylor) -> TaylorMatrix {
-        let rho = self.rho(t);
         let n = self.weights.q.nrows();
-        let (Form::Direct(function) | Form::Inverse(function)) = &self.form;
-        let matrix = TaylorMatrix::of_function(function, rho);
+        let matrix = self.lyapunov(t);
         let Some((row, bound)) = border else { return matrix };
         let row: Vec<Taylor> = match row {
             Row::Input(i) => self.low_row(piece, i, t),
