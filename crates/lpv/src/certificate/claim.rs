@@ -464,6 +464,7 @@ fn witness_words(kind: &ClaimKind) -> &'static str {
         ClaimKind::Unsaturated { .. } => "a limit is passed at a multiple of the state of the witness, inside the set",
         ClaimKind::Decrease { .. } => "V grows from the state of the witness",
         ClaimKind::Invariance { .. } => "the motion from the state of the witness leaves the set",
+        ClaimKind::SampledInvariance { .. } => "the next sample after the state of the witness is outside the set",
         ClaimKind::Cost { .. } => "the motion from a small multiple of the state of the witness costs more",
         ClaimKind::FrozenStability | ClaimKind::SampledStability { .. } => {
             "the motion from the state of the witness does not come to rest"
@@ -495,8 +496,9 @@ pub fn settle(claims: &mut [Claim]) {
             };
             let is_refuted_premise = premise.is_some_and(|premise| premise.verdict == Verdict::Refuted);
             let claim = &mut claims[at];
-            // a witness of its own stands, unless what it was evaluated with is false
-            let stands = claim.verdict == Verdict::Refuted && !is_refuted_premise;
+            // a witness of its own stands, unless what it was evaluated with is false; a step of the sampled loop is evaluated with its limits
+            let is_own = !is_refuted_premise || matches!(claim.kind, ClaimKind::SampledInvariance { .. });
+            let stands = claim.verdict == Verdict::Refuted && is_own;
             if stands || claim.verdict <= verdict && !is_refuted_premise {
                 continue;
             }

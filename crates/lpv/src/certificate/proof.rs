@@ -24,6 +24,7 @@ mod sampled;
 mod sampled_constant;
 mod sampled_saturated;
 mod sampled_spectrum;
+mod sampled_witness;
 mod weights;
 mod witness;
 
@@ -350,7 +351,10 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         claims.push(Claim::new(ClaimKind::AsAsked { what: "rate", asked: rate, proved }, Of::Model, &words));
     }
     claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
-    claims.extend(level.map(|level| sampled_saturated::prove(&closed_loop, &words, level, design.sample_time_s)));
+    if let Some(level) = level {
+        let is_founded = claims.iter().all(|c| c.id.name != "unsaturated" || c.verdict == Verdict::Proved);
+        claims.push(sampled_saturated::prove(&closed_loop, &words, level, design.sample_time_s, is_founded));
+    }
     let mut nonlinear = None;
     if options.nonlinear {
         let (found, proof) = nonlinear::prove(&closed_loop, &words, level);

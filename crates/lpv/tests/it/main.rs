@@ -13,5 +13,6 @@ mod proofs;
 mod quadrotor;
 mod records;
 mod rowwise;
+mod sampled;
 mod synthesis;
 mod tensor_product;

@@ -56,6 +56,8 @@ pub(super) struct ClosedLoop<'a> {
     schedule: &'a Schedule,
     pub weights: &'a CostWeights,
     pub limits: &'a InputLimits,
+    /// u* of the controller.
+    pub operating_input: &'a [f64],
     /// σᵢ: how far each input may go to either side of its operating value, rounded down; infinite where it is not limited.
     pub sigma: Vec<f64>,
     pub form: Form,
@@ -173,8 +175,22 @@ impl<'a> ClosedLoop<'a> {
         let weights = &design.weights;
         let has_parameter = scheduling.is_some();
         let limits = &design.controller.limits;
-        let sigma = limits.room(&design.controller.operating_input);
-        Ok(Self { plant, schedule, weights, limits, sigma, form, auxiliary, low, step, pieces, has_parameter })
+        let operating_input = &design.controller.operating_input;
+        let sigma = limits.room(operating_input);
+        Ok(Self {
+            plant,
+            schedule,
+            weights,
+            limits,
+            operating_input,
+            sigma,
+            form,
+            auxiliary,
+            low,
+            step,
+            pieces,
+            has_parameter,
+        })
     }
 
     /// Whether the gain that flies may saturate on the set, so that input `i` lies between rows of F and K.

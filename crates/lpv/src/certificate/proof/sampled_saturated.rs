@@ -32,6 +32,7 @@ use super::closed_loop::{ClosedLoop, Form, Place};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use super::rowwise::{Balanced, Rows, multipliers, shares};
 use super::sampled::{hold, rest};
+use super::sampled_witness::leaves_when_sampled;
 use super::witness::middle as middle_of;
 use super::{Attempt, Cells, LEAST_HALF};
 use crate::certificate::claim::{Claim, ClaimKind, Verdict, Words};
@@ -71,8 +72,15 @@ pub(super) struct SaturatedCell {
     pub multipliers: Option<Vec<f64>>,
 }
 
-/// The claim that the saturated, sampled loop keeps {V ≤ γ} invariant.
-pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, level: f64, sample_time_s: f64) -> Claim {
+/// The claim that the saturated, sampled loop keeps {V ≤ γ} invariant. Where it is not proved, or rests on what is not (`is_founded`), a
+/// state that leaves the set is looked for.
+pub(super) fn prove(
+    closed_loop: &ClosedLoop,
+    words: &Words,
+    level: f64,
+    sample_time_s: f64,
+    is_founded: bool,
+) -> Claim {
     let started = Instant::now();
     let kind = ClaimKind::SampledInvariance { level, sample_time_s };
     let premises = ["lyapunov-definite", "unsaturated"];
@@ -86,7 +94,14 @@ pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, level: f64, sample_
     };
     let all = attempt(Times::All);
     let (times, attempt, cells) = if matches!(all.1, Attempt::Proved(_)) { all } else { attempt(Times::Samples) };
-    let mut claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&premises);
+    let witness = match &attempt {
+        Attempt::Proved(_) if is_founded => None,
+        Attempt::Proved(_) => leaves_when_sampled(closed_loop, None, level, sample_time_s),
+        Attempt::Refuted { place, .. } | Attempt::Open { place } => {
+            leaves_when_sampled(closed_loop, Some(*place), level, sample_time_s)
+        }
+    };
+    let mut claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&premises).refuted_by(witness);
     if claim.verdict == Verdict::Proved {
         let when = match times {
             Times::All => "at the samples and between them",
