@@ -68,7 +68,6 @@ pub(super) struct SaturatedCell {
     /// Of each φ, or of each mixture of one.
     known: Vec<Definiteness>,
     /// cᵢ; `None` where mixtures were taken one by one. For a record.
-    #[allow(dead_code)]
     pub multipliers: Option<Vec<f64>>,
 }
 
