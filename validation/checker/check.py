@@ -18,6 +18,7 @@ A cell that is too wide for that is halved; one that is missing is refused. The 
 every claim holds.
 """
 import argparse
+import collections
 import hashlib
 import itertools
 import json
@@ -215,29 +216,29 @@ def blocks(grid):
 # -------------------------------------------------------------------------------------------------- positive definite
 
 def inverse_factor(m, n):
-    """L⁻¹ of M ≈ LLᵀ in floating point, as rows; None if there is none."""
-    factor, inverse = [], []
+    """L⁻¹ of M ≈ LLᵀ in floating point; None if there is none."""
+    dot, factor, columns = (lambda x, y: sum(map(mul, x, y))), [], []  # of L⁻¹, each from its diagonal on
     for i in range(n):
         row = []
         for j in range(i):
-            row.append((m[i * n + j] - sum(map(mul, row, factor[j]))) / factor[j][j])
-        pivot = m[i * n + i] - sum(map(mul, row, row))
+            row.append((m[i * n + j] - dot(row, factor[j])) / factor[j][j])
+        pivot = m[i * n + i] - dot(row, row)
         if not 0.0 < pivot < math.inf:
             return None
-        pivot, sums = math.sqrt(pivot), [0.0] * i + [1.0] + [0.0] * (n - i - 1)
-        for x, known in zip(row, inverse):
-            sums = [s - x * y for s, y in zip(sums, known)]
-        inverse.append([s / pivot for s in sums])
+        pivot = math.sqrt(pivot)
+        for j, column in enumerate(columns):
+            column.append(-dot(row[j:], column) / pivot)
+        columns.append([1.0 / pivot])
         factor.append(row + [pivot])
-    return inverse if all(math.isfinite(x) for row in inverse for x in row) else None
+    inverse = [[columns[j][i - j] if j <= i else 0.0 for j in range(n)] for i in range(n)]
+    return arb_mat(inverse) if all(math.isfinite(x) for row in inverse for x in row) else None
 
 
-def is_definite(entries, n):
-    """Whether every symmetric matrix in the ball matrix is positive definite."""
-    t = inverse_factor([float(entry.mid()) for entry in entries], n)
+def is_definite(entries, n, t=None):
+    """Whether every symmetric matrix in the ball matrix is positive definite, shown with T, or with one of its own."""
+    t = inverse_factor([float(entry.mid()) for entry in entries], n) if t is None else t
     if t is None:
         return False
-    t = arb_mat(t)
     off = (t * arb_mat(n, n, entries) * t.transpose()).entries()
     for i in range(n):
         off[i * n + i] -= 1
@@ -281,9 +282,11 @@ class Family:
         for (a, b, extra), left, right, bend in zip(cells, values, values[1:], bends):
             share = arb(-1, 1) * (arb(b) - a) ** 2 / 16  # [-(b - a)²/8, 0]
             error = self.assemble([share * x for x in bend], extra, 0)
-            sums = ([x + e for x, e in zip(self.assemble(end, extra, 1), error)] for end in (left, right))
-            middle = a + (b - a) / 2
-            if not all(is_definite(entries, math.isqrt(len(entries))) for entries in sums) and not (
+            ends = [self.assemble(end, extra, 1) for end in (left, right)]
+            n, middle = math.isqrt(len(error)), a + (b - a) / 2
+            t = inverse_factor([float((x + y).mid()) / 2 for x, y in zip(*ends)], n)  # of halfway, which may do for both
+            sums = ([x + e for x, e in zip(end, error)] for end in ends)
+            if not all(any(is_definite(entries, n, x) for x in (t, None)) for entries in sums) and not (
                 halvings > 0
                 and a < middle < b
                 and self.is_definite_on([[a, middle, extra], [middle, b, extra]], halvings - 1)
@@ -764,6 +767,8 @@ def check_file(designs, path):
         require(same(mine, files), "the file has another design")
         return
     for k, design in enumerate(designs):  # one polytope, or one for each vertex
+        for key in ("sigma", "rate_vertices"):
+            require(same(design.line.get(key), file.get(key)), "the file has another design")
         pairs = [(design.line["weights"], file.get("weights"))]
         pairs += [(design.line[key], file["model"][key]) for key in "AB"]
         pairs += [(design.line[key], file.get(key)) for key in "KFYL" if design.line.get(key) is not None]
@@ -811,12 +816,18 @@ def check(path, file=None, jobs=2):
             check_cells(design, claim)
         tasks += [(claim, group, 0.0) for group in (claim["groups"] if isinstance(design, Design) else [None])]
     WORK.update(designs=designs, tasks=tasks)
+    # the first cells of each claim before the second: what is false shows early
+    order, rank = [], collections.Counter()
+    for claim, _, floor in tasks:
+        rank[claim["claim"], floor] += 1
+        order.append(rank[claim["claim"], floor])
+    order = sorted(range(len(tasks)), key=order.__getitem__)
     if jobs == 1:
-        for failure in map(work, range(len(tasks))):
+        for failure in map(work, order):
             require(not failure, failure)
         return [statement(claim) for claim in claims]
     with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
-        for failure in pool.map(work, range(len(tasks)), chunksize=4):
+        for failure in pool.map(work, order, chunksize=4):
             if failure:
                 pool.shutdown(cancel_futures=True)
                 raise Refused(failure)
