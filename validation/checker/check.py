@@ -18,6 +18,7 @@ A cell that is too wide for that is halved; one that is missing is refused. The 
 every claim holds.
 """
 import argparse
+import collections
 import hashlib
 import itertools
 import json
@@ -215,29 +216,29 @@ def blocks(grid):
 # -------------------------------------------------------------------------------------------------- positive definite
 
 def inverse_factor(m, n):
-    """L⁻¹ of M ≈ LLᵀ in floating point, as rows; None if there is none."""
-    factor, inverse = [], []
+    """L⁻¹ of M ≈ LLᵀ in floating point; None if there is none."""
+    dot, factor, columns = (lambda x, y: sum(map(mul, x, y))), [], []  # of L⁻¹, each from its diagonal on
     for i in range(n):
         row = []
         for j in range(i):
-            row.append((m[i * n + j] - sum(map(mul, row, factor[j]))) / factor[j][j])
-        pivot = m[i * n + i] - sum(map(mul, row, row))
+            row.append((m[i * n + j] - dot(row, factor[j])) / factor[j][j])
+        pivot = m[i * n + i] - dot(row, row)
         if not 0.0 < pivot < math.inf:
             return None
-        pivot, sums = math.sqrt(pivot), [0.0] * i + [1.0] + [0.0] * (n - i - 1)
-        for x, known in zip(row, inverse):
-            sums = [s - x * y for s, y in zip(sums, known)]
-        inverse.append([s / pivot for s in sums])
+        pivot = math.sqrt(pivot)
+        for j, column in enumerate(columns):
+            column.append(-dot(row[j:], column) / pivot)
+        columns.append([1.0 / pivot])
         factor.append(row + [pivot])
-    return inverse if all(math.isfinite(x) for row in inverse for x in row) else None
+    inverse = [[columns[j][i - j] if j <= i else 0.0 for j in range(n)] for i in range(n)]
+    return arb_mat(inverse) if all(math.isfinite(x) for row in inverse for x in row) else None
 
 
-def is_definite(entries, n):
-    """Whether every symmetric matrix in the ball matrix is positive definite."""
-    t = inverse_factor([float(entry.mid()) for entry in entries], n)
+def is_definite(entries, n, t=None):
+    """Whether every symmetric matrix in the ball matrix is positive definite, shown with T, or with one of its own."""
+    t = inverse_factor([float(entry.mid()) for entry in entries], n) if t is None else t
     if t is None:
         return False
-    t = arb_mat(t)
     off = (t * arb_mat(n, n, entries) * t.transpose()).entries()
     for i in range(n):
         off[i * n + i] -= 1
@@ -281,15 +282,31 @@ class Family:
         for (a, b, extra), left, right, bend in zip(cells, values, values[1:], bends):
             share = arb(-1, 1) * (arb(b) - a) ** 2 / 16  # [-(b - a)²/8, 0]
             error = self.assemble([share * x for x in bend], extra, 0)
-            sums = ([x + e for x, e in zip(self.assemble(end, extra, 1), error)] for end in (left, right))
-            middle = a + (b - a) / 2
-            if not all(is_definite(entries, math.isqrt(len(entries))) for entries in sums) and not (
+            ends = [self.assemble(end, extra, 1) for end in (left, right)]
+            n, middle = math.isqrt(len(error)), a + (b - a) / 2
+            t = inverse_factor([float((x + y).mid()) / 2 for x, y in zip(*ends)], n)  # of halfway, which may do for both
+            sums = ([x + e for x, e in zip(end, error)] for end in ends)
+            if not all(any(is_definite(entries, n, x) for x in (t, None)) for entries in sums) and not (
                 halvings > 0
                 and a < middle < b
                 and self.is_definite_on([[a, middle, extra], [middle, b, extra]], halvings - 1)
             ):
                 return False
         return True
+
+def bordered(base, push, difference):
+    """Sums and their assembly to [M, δᵀ; δ, 4c], δ = g + cd for the rows g of `push`, d of `difference` and the numbers
+    c > 0 of a cell. It is positive definite if M - Σ δᵢᵀδᵢ/4cᵢ is, and then xᵀMx > Σ θᵢ(dᵢx)(gᵢx) for all 0 ≤ θᵢ ≤ 1, because
+    (dx)(gx) = (dx)(δx) - c(dx)² ≤ (δx)²/4c."""
+    (rows, n) = push.shape
+
+    def assemble(entries, c, constant):
+        part = lambda first: [entries[n * (first + i) : n * (first + i + 1)] for i in range(rows)]
+        delta = [[g + weight * d for g, d in zip(*pair)] for weight, pair in zip(c, zip(part(n), part(n + rows)))]
+        top = [entries[n * i : n * i + n] + [row[i] for row in delta] for i in range(n)]
+        corner = lambda i: [constant * 4 * c[i] if i == j else arb(0) for j in range(rows)]
+        return sum(top + [row + corner(i) for i, row in enumerate(delta)], [])
+    return [base, push, difference], assemble
 
 # -------------------------------------------------------------------------------------------------------- the designs
 
@@ -447,8 +464,7 @@ class Design:
         V = xᵀY⁻¹x:   -(AY - BG + ·ᵀ) + ρ̇ Y′ - ratio (YQY + GᵀRG),  G = SY, between Y⁻¹
 
         With flying = "rows" an input is f x + θ(k - f)x, 0 ≤ θ ≤ 1, and θ² ≤ θ: the form is at least that of S = F less
-        Σ θ (dᵢx)(gᵢx), d = k - f, g = ratio rᵢ(k + f) - 2bᵢᵀP; and (dx)(gx) ≤ ((g + cd)x)²/4c for c > 0, which borders:
-        [M, δᵀ; δ, 4c], δ = g + cd.
+        Σ θ (dᵢx)(gᵢx), d = k - f, g = ratio rᵢ(k + f) - 2bᵢᵀP (`bordered`).
         """
         w, q, r, (k, low) = self.lyapunov, Sum.constant(self.q), Sum.constant(self.r), self.gains(piece)
         of_k = lambda i: i not in self.saturating or (flying != "rows" and i in flying)
@@ -462,39 +478,60 @@ class Design:
             return Family(self.place(piece), [base])
         require(all(self.r[i][j] == 0 for i in range(self.m) for j in range(i)), "R is not diagonal")
         push = (r @ (k + low)).times(ratio) - (self.b if self.inverse else w @ self.b).t.times(2)
-        n, rows = self.n, len(self.saturating)
+        return Family(self.place(piece), *bordered(base, push.rows(self.saturating), (k - low).rows(self.saturating)))
 
-        def assemble(entries, c, constant):
-            part = lambda first: [entries[n * (first + i) : n * (first + i + 1)] for i in range(rows)]
-            delta = [[g + weight * d for g, d in zip(*pair)] for weight, pair in zip(c, zip(part(n), part(n + rows)))]
-            top = [entries[n * i : n * i + n] + [row[i] for row in delta] for i in range(n)]
-            corner = lambda i: [constant * 4 * c[i] if i == j else arb(0) for j in range(rows)]
-            return sum(top + [row + corner(i) for i, row in enumerate(delta)], [])
-        return Family(self.place(piece), [base, push.rows(self.saturating), (k - low).rows(self.saturating)], assemble)
+    def held(self, time):
+        """(AT)^k/(k + 1)!, k = 0, 1, …, with the rest of the series as the last: x(T) = x + TΦ(Ax + Bu) while u is held
+        for T, where Φ is their sum."""
+        terms, n = [unit(self.n)], self.n
+        while terms[-1].terms and len(terms) <= SERIES:
+            terms.append((terms[-1] @ self.a).times(arb(time) / (len(terms) + 1)))
+        if terms[-1].terms:  # the rest is at most Σ_{k > N} a^k/(k + 1)! ≤ 2 a^{N+1}/(N + 2)! for the norm a ≤ N/2 of AT
+            at = self.a.times(time).terms
+            require(set(at) == {(0, 0, 0)}, "the series of a plant with a parameter does not end")
+            norm = reduce(arb.max, (sum((x.abs_upper() for x in row), arb(0)) for row in at[0, 0, 0].tolist()))
+            require(norm < SERIES / 2, "the sample time is too long")
+            rest = arb(0, (2 * norm ** (SERIES + 1) / arb.fac_ui(SERIES + 2)).abs_upper())
+            terms.append(Sum((n, n), {(0, 0, 0): arb_mat([[rest] * n] * n)}))
+        return terms
+
+    def kept(self, piece, time, between):
+        """V is smaller at the next sample than at x, of every v between Fx and Kx that is held; one family for each φ.
+
+        x(τ) = x + τE x, E = φ(A - BS), v = Sx. V(x(τ)) < V(x) is EᵀP + PE + τEᵀPE ≺ 0; by Schur, with H = PE (or EY),
+        [-(H + Hᵀ), THᵀ; TH, TP] ≻ 0 is enough for τ ≤ T. It is affine in E and so in S: row i adds θ(uwᵀ + wuᵀ),
+        u = (d, 0), w = (η, -Tη), η = Pφbᵢ, which is -θ(u·)(g·), g = -2w, as in `bordered`. At the sample φ = Φ. For all
+        τ = sT, N = AT: φ = I + sN/2 + s²N²/6 + s³(…), by Bernstein's polynomials a convex combination of I, I + N/4 and
+        I + N/2 + N²/6, and what follows, N^k s^k/(k + 1)!, is in [0, 1] N^k/(k + 1)!.
+        """
+        w, (k, low), terms = self.lyapunov, self.gains(piece), self.held(time)
+        flow = (self.a @ w if self.inverse else self.a) - self.b @ low
+        shares = [(0, 0), (0.5, 0), (1, 1)] if between else [(1, 1)]
+        for share in shares:
+            weights = [1, *share] + [arb(0.5, 0.5) if between else 1] * len(terms)
+            phi = reduce(add, (term.times(weight) for term, weight in zip(terms, weights)))
+            h, eta = (phi @ x if self.inverse else w @ phi @ x for x in (flow, self.b))
+            base = blocks([[(h + h.t).times(-1), h.t.times(time)], [h.times(time), w.times(time)]])
+            if not self.saturating:
+                yield Family(self.place(piece), [base])
+                continue
+            push = blocks([[eta.t.times(-2), eta.t.times(2 * time)]]).rows(self.saturating)
+            difference = blocks([[k - low, Sum((self.m, self.n), {})]]).rows(self.saturating)
+            yield Family(self.place(piece), *bordered(base, push, difference))
 
     def sampled(self, piece, time):
         """With X of the cell: [-(EᵀX + XE), TEᵀX; TXE, TX] ≻ 0, so that X - (I + TE)ᵀX(I + TE) ≻ 0 and X ≻ 0.
 
-        x₊ = (I + TE)x is the loop whose input is held for T: E = Φ(A - BK), Φ = Σ (AT)^k/(k + 1)!.
+        x₊ = (I + TE)x is the loop whose input is held for T: E = Φ(A - BK).
         """
-        at, power, n = self.a.times(time), unit(self.n), self.n
-        series, k = power, 0
-        while power.terms and k < SERIES:
-            k, power = k + 1, (power @ at).times(arb(1) / (k + 2))
-            series += power
-        if power.terms:  # the rest is at most Σ_{k > N} a^k/(k + 1)! ≤ 2 a^{N+1}/(N + 2)! for the norm a ≤ N/2 of AT
-            require(set(at.terms) == {(0, 0, 0)}, "the series of a plant with a parameter does not end")
-            norm = reduce(arb.max, (sum((x.abs_upper() for x in row), arb(0)) for row in at.terms[0, 0, 0].tolist()))
-            require(norm < SERIES / 2, "the sample time is too long")
-            rest = arb(0, (2 * norm ** (SERIES + 1) / arb.fac_ui(SERIES + 2)).abs_upper())
-            series += Sum((n, n), {(0, 0, 0): arb_mat([[rest] * n] * n)})
+        n = self.n
 
         def assemble(entries, x, constant):
             xe = x * arb_mat(n, n, entries)
             flow, side, corner = ((xe + xe.transpose()) * arb(-1), xe * arb(time), x * arb(time * constant))
             top = zip(flow.tolist(), side.transpose().tolist())
             return sum((left + right for left, right in itertools.chain(top, zip(side.tolist(), corner.tolist()))), [])
-        return Family(self.place(piece), [series @ (self.a - self.b @ self.schedule(piece))], assemble)
+        return Family(self.place(piece), [reduce(add, self.held(time)) @ (self.a - self.b @ self.schedule(piece))], assemble)
 
 
 class Polytope:
@@ -572,7 +609,8 @@ def check_premises(claims, claim, design):
     limited = kind not in ("definite", "sampled") and bool(design.limited)
     falls = ["definite", "unsaturated"] if limited else ["definite"]
     needed = {"definite": [], "sampled": [], "unsaturated": ["definite"], "decrease": falls}
-    needed["cost"] = [*falls, "decrease"]
+    # what V falls under for every v between Fx and Kx, it falls under for v = Kx
+    needed |= {"cost": [*falls, "decrease"], "kept": falls, "sampled": ["kept"] if premises else []}
     require([premise["kind"] for premise in premises] == needed[kind], "it does not rest on what it has to")
     require(all(premise["design"] == claim["design"] for premise in premises), "a premise is of another design")
     if kind not in ("definite", "sampled"):
@@ -582,12 +620,15 @@ def check_premises(claims, claim, design):
     if kind in ("decrease", "cost") and isinstance(design, Design):
         require(design.parameter is not None or claim["rate"] == 0, "there is no parameter that moves")
         require(claim["rate"] >= 0 and (kind != "cost" or premises[-1]["rate"] >= claim["rate"]), "the rate is wrong")
-    require(kind != "sampled" or claim["sample_time_s"] == design.line["sample_time_s"] > 0, "the sample time is wrong")
+    is_sampled = kind in ("sampled", "kept")
+    require(not is_sampled or claim["sample_time_s"] == design.line["sample_time_s"] > 0, "the sample time is wrong")
 
 
 def check_cells(design, claim):
     """Whether the cells of every variant cover the range without gaps."""
     groups, variants = claim["groups"], design.limited if claim["kind"] == "unsaturated" else [None]
+    if claim["kind"] == "sampled" and claim["premises"]:
+        return require(not groups, "cells are of no use beside a premise")
     if claim["kind"] in ("decrease", "cost") and design.saturating:
         chosen = itertools.product((False, True), repeat=len(design.saturating))
         all_rows = [list(itertools.compress(design.saturating, bits)) for bits in chosen]
@@ -599,7 +640,7 @@ def check_cells(design, claim):
         require(cells and cells[0][0] == piece and cells[-1][1] == piece + 1, "cells do not cover their piece")
         require(all(cell[0] < cell[1] for cell in cells), "a cell is empty")
         require(all(left[1] == right[0] for left, right in zip(cells, cells[1:])), "there is a gap between cells")
-        has_more = claim["kind"] == "sampled" or group["variant"] == "rows"
+        has_more = claim["kind"] in ("sampled", "kept") or group["variant"] == "rows"
         require(all(len(cell) == 2 + has_more for cell in cells), "a cell has too little or too much")
 
 
@@ -613,10 +654,13 @@ def prove_group(design, claim, group, floor):
             cell[2] = arb_mat(cell[2])
         family = design.sampled(piece, claim["sample_time_s"])
         return all(family.is_definite_on([cell]) for cell in cells)
-    if variant == "rows":
+    if variant == "rows" or kind == "kept":
         many = len(design.saturating)
-        require(all(len(c) == many and min(c) > 0 for _, _, c in cells), "a weight of a row is not positive")
+        require(all(len(c) == many and min(c, default=1) > 0 for _, _, c in cells), "a weight of a row is not positive")
         cells = [[a, b, [arb(x) for x in c]] for a, b, c in cells]
+    if kind == "kept":
+        families = design.kept(piece, claim["sample_time_s"], claim["between"])
+        return all(family.is_definite_on(cells) for family in families)
     if kind == "definite":
         return design.definite(piece, floor).is_definite_on(cells)
     if kind == "unsaturated":
@@ -701,6 +745,8 @@ def statement(claim):
         "decrease": f"V decreases{on} while the parameter's rate is at most {claim.get('rate')!r}",
         "cost": f"the cost is at most {claim.get('factor')!r} V(x(0)){on} while it is at most {claim.get('rate')!r}",
         "sampled": f"the loop sampled at T = {claim.get('sample_time_s')!r} s is stable at every fixed parameter",
+        "kept": f"the saturated loop sampled at T = {claim.get('sample_time_s')!r} s stays{on} at every fixed parameter, "
+        + ("at the samples and between them" if claim.get("between") else "at the samples"),
         "motion": f"the reference moves as the model does, each state by up to {claim.get('farthest')!r}",
     }[claim["kind"]].replace(" while the parameter's rate is at most None", "").replace(" while it is at most None", "")
 
@@ -721,6 +767,8 @@ def check_file(designs, path):
         require(same(mine, files), "the file has another design")
         return
     for k, design in enumerate(designs):  # one polytope, or one for each vertex
+        for key in ("sigma", "rate_vertices"):
+            require(same(design.line.get(key), file.get(key)), "the file has another design")
         pairs = [(design.line["weights"], file.get("weights"))]
         pairs += [(design.line[key], file["model"][key]) for key in "AB"]
         pairs += [(design.line[key], file.get(key)) for key in "KFYL" if design.line.get(key) is not None]
@@ -768,12 +816,18 @@ def check(path, file=None, jobs=2):
             check_cells(design, claim)
         tasks += [(claim, group, 0.0) for group in (claim["groups"] if isinstance(design, Design) else [None])]
     WORK.update(designs=designs, tasks=tasks)
+    # the first cells of each claim before the second: what is false shows early
+    order, rank = [], collections.Counter()
+    for claim, _, floor in tasks:
+        rank[claim["claim"], floor] += 1
+        order.append(rank[claim["claim"], floor])
+    order = sorted(range(len(tasks)), key=order.__getitem__)
     if jobs == 1:
-        for failure in map(work, range(len(tasks))):
+        for failure in map(work, order):
             require(not failure, failure)
         return [statement(claim) for claim in claims]
     with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
-        for failure in pool.map(work, range(len(tasks)), chunksize=4):
+        for failure in pool.map(work, order, chunksize=4):
             if failure:
                 pool.shutdown(cancel_futures=True)
                 raise Refused(failure)

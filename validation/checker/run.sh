@@ -26,8 +26,8 @@ for scenario in double-integrator quadrotor quadrotor-governed; do
     for design in "$scenario"/design-*.json; do
         name=$(basename "$design" .json)
         case "$scenario/$name" in
-            # frozen high gains, of which little is proved; the second is the first again
-            quadrotor*/design-high-gain-20 | quadrotor*/design-high-gain-20-ekf) continue ;;
+            # the same design again, for an estimator
+            quadrotor/design-high-gain-20-ekf) continue ;;
         esac
         record "$scenario-${name#design-}" "$design"
     done
@@ -36,5 +36,9 @@ for problem in double-integrator pendulum quadrotor-arc two-masses; do
     "$lpv" design "$root/problems/$problem.toml" --out "problem-$problem.json" --force > "problem-$problem.txt"
     record "problem-$problem" "problem-$problem.json"
 done
-"$python" "$here/edits.py" double-integrator-high-gain-60.jsonl quadrotor-lpvqr.jsonl quadrotor-slpvqr-1.jsonl \
-    quadrotor-governed-moving.jsonl problem-pendulum.jsonl problem-two-masses.jsonl
+# the smaller records, of every kind that there is
+"$python" "$here/edits.py" double-integrator-high-gain-60.jsonl=double-integrator/design-high-gain-60.json \
+    quadrotor-lpvqr.jsonl=quadrotor/design-lpvqr.json quadrotor-slpvqr-1.jsonl=quadrotor/design-slpvqr-1.json \
+    quadrotor-high-gain-20-rate.jsonl=quadrotor/design-high-gain-20-rate.json \
+    quadrotor-governed-moving.jsonl=quadrotor-governed/design-moving.json \
+    problem-pendulum.jsonl=problem-pendulum.json problem-two-masses.jsonl=problem-two-masses.json

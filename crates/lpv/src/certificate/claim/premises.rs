@@ -25,8 +25,9 @@ pub fn settle(claims: &mut [Claim]) {
             };
             let is_refuted_premise = premise.is_some_and(|premise| premise.verdict == Verdict::Refuted);
             let claim = &mut claims[at];
-            // a witness of its own stands, unless what it was evaluated with is false
-            let stands = claim.verdict == Verdict::Refuted && !is_refuted_premise;
+            // a witness of its own stands, unless what it was evaluated with is false; a step of the sampled loop is evaluated with its limits
+            let is_own = !is_refuted_premise || matches!(claim.kind, ClaimKind::SampledInvariance { .. });
+            let stands = claim.verdict == Verdict::Refuted && is_own;
             if stands || claim.verdict <= verdict && !is_refuted_premise {
                 continue;
             }

@@ -115,6 +115,7 @@ pub(super) fn witness_words(kind: &ClaimKind) -> &'static str {
         ClaimKind::Unsaturated { .. } => "a limit is passed at a multiple of the state of the witness, inside the set",
         ClaimKind::Decrease { .. } => "V grows from the state of the witness",
         ClaimKind::Invariance { .. } => "the motion from the state of the witness leaves the set",
+        ClaimKind::SampledInvariance { .. } => "the next sample after the state of the witness is outside the set",
         ClaimKind::Cost { .. } => "the motion from a small multiple of the state of the witness costs more",
         ClaimKind::FrozenStability | ClaimKind::SampledStability { .. } => {
             "the motion from the state of the witness does not come to rest"

@@ -56,6 +56,8 @@ pub(super) struct ClosedLoop<'a> {
     schedule: &'a Schedule,
     pub weights: &'a CostWeights,
     pub limits: &'a InputLimits,
+    /// u* of the controller.
+    pub operating_input: &'a [f64],
     /// σᵢ: how far each input may go to either side of its operating value, rounded down; infinite where it is not limited.
     pub sigma: Vec<f64>,
     pub form: Form,
@@ -173,8 +175,22 @@ impl<'a> ClosedLoop<'a> {
         let weights = &design.weights;
         let has_parameter = scheduling.is_some();
         let limits = &design.controller.limits;
-        let sigma = limits.room(&design.controller.operating_input);
-        Ok(Self { plant, schedule, weights, limits, sigma, form, auxiliary, low, step, pieces, has_parameter })
+        let operating_input = &design.controller.operating_input;
+        let sigma = limits.room(operating_input);
+        Ok(Self {
+            plant,
+            schedule,
+            weights,
+            limits,
+            operating_input,
+            sigma,
+            form,
+            auxiliary,
+            low,
+            step,
+            pieces,
+            has_parameter,
+        })
     }
 
     /// Whether the gain that flies may saturate on the set, so that input `i` lies between rows of F and K.
@@ -264,7 +280,7 @@ impl<'a> ClosedLoop<'a> {
     }
 
     /// S of a mixture, and K; in the inverse form SY and KY.
-    fn gains(&self, k: TaylorMatrix, mixture: usize, t: Taylor) -> [TaylorMatrix; 2] {
+    pub fn gains(&self, k: TaylorMatrix, mixture: usize, t: Taylor) -> [TaylorMatrix; 2] {
         let rho = self.rho(t);
         let high = match &self.form {
             Form::Direct(_) => k,
@@ -351,6 +367,12 @@ impl<'a> ClosedLoop<'a> {
         Decrease::new(&over, &middle)
     }
 
+    /// P or Y.
+    pub fn lyapunov(&self, t: Taylor) -> TaylorMatrix {
+        let (Form::Direct(function) | Form::Inverse(function)) = &self.form;
+        TaylorMatrix::of_function(function, self.rho(t))
+    }
+
     /// P or Y on the cell; bordered by a row f and a bound b² where one is asked for (5.21): its positivity is (fx)² < b²
     /// on V ≤ 1.
     pub fn bordered(&self, place: &Place, border: Option<(Row, Interval)>) -> CellMatrix {
@@ -366,10 +388,8 @@ impl<'a> ClosedLoop<'a> {
     }
 
     fn bordered_at(&self, piece: usize, border: Option<(Row, Interval)>, t: Taylor) -> TaylorMatrix {
-        let rho = self.rho(t);
         let n = self.weights.q.nrows();
-        let (Form::Direct(function) | Form::Inverse(function)) = &self.form;
-        let matrix = TaylorMatrix::of_function(function, rho);
+        let matrix = self.lyapunov(t);
         let Some((row, bound)) = border else { return matrix };
         let row: Vec<Taylor> = match row {
             Row::Input(i) => self.low_row(piece, i, t),

@@ -14,6 +14,7 @@ use super::closed_loop::{ByRows, ClosedLoop, Form, Place, Row};
 use super::decrease::{DecreaseProof, Found};
 use super::matrix::CellMatrix;
 use super::polytopic::{PolytopicClaim, PolytopicLyapunov};
+use super::sampled_saturated::{self, SaturatedCell, Times};
 use super::{Attempt, Cells, LEAST_HALF, Proofs, Unprovable, sampled_constant};
 use crate::certificate::{Claim, ClaimKind, Motion, Of, SupervisedProofs, Verdict};
 use crate::math::Mat;
@@ -64,6 +65,7 @@ const UNSATURATED: (&str, &[&str]) = ("unsaturated", &["unsaturated"]);
 const DECREASE: (&str, &[&str]) = ("decrease", &["decrease", "invariance"]);
 const COST: (&str, &[&str]) = ("cost", &["cost"]);
 const SAMPLED: (&str, &[&str]) = ("sampled", &["sampled-stability"]);
+const KEPT: (&str, &[&str]) = ("kept", &["sampled-invariance"]);
 
 /// The proved claim of this kind about the model.
 fn proved<'c>(claims: &'c [Claim], (_, names): (&str, &[&str])) -> Option<&'c Claim> {
@@ -124,8 +126,9 @@ impl Record {
             value.insert("level".into(), json!(level));
             premises.push(self.add("claim", value)?);
         }
-        let mut cost = None;
         let needed = 1 + usize::from(proofs.level.is_some());
+        let founded = premises.clone();
+        let mut cost = None;
         for (place, kind) in [DECREASE, COST].into_iter().enumerate() {
             let Some(found) = proved(&proofs.claims, kind).filter(|_| premises.len() == needed + place) else { break };
             let (rate, factor) = match found.kind {
@@ -142,11 +145,21 @@ impl Record {
             premises.push(number);
             cost = factor.map(|_| number);
         }
+        let (mut kept, time) = (None, design.sample_time_s);
+        if let (Some(level), Some(_), true) = (proofs.level, proved(&proofs.claims, KEPT), founded.len() == needed) {
+            // one that takes mixtures is not recorded
+            if let Some((times, cells)) = kept_cells(closed_loop, time) {
+                let mut value = claim(KEPT.0, &founded, cells);
+                value.extend(object(json!({"level": level, "sample_time_s": time, "between": times == Times::All})));
+                kept = Some(self.add("claim", value)?);
+            }
+        }
         if proved(&proofs.claims, SAMPLED).is_some() {
-            // one that is proved by other means than a matrix for each cell is not recorded
-            if let Ok(cells) = sampled_cells(closed_loop, design.sample_time_s) {
-                let mut value = claim(SAMPLED.0, &[], cells);
-                value.insert("sample_time_s".into(), json!(design.sample_time_s));
+            // V that falls under every mixture falls under K; one that is proved by other means than a matrix for each cell is not recorded
+            let cells = kept.map_or_else(|| sampled_cells(closed_loop, time), |_| Ok(Vec::new()));
+            if let Ok(cells) = cells {
+                let mut value = claim(SAMPLED.0, &kept.into_iter().collect::<Vec<usize>>(), cells);
+                value.insert("sample_time_s".into(), json!(time));
                 self.add("claim", value)?;
             }
         }
@@ -381,6 +394,17 @@ fn sampled_cells(closed_loop: &ClosedLoop, sample_time_s: f64) -> Result<Vec<Val
     let (cells, attempt) = sampled_constant::prove_cells(closed_loop, sample_time_s);
     found(&attempt, "the sampled loop is stable")?;
     Ok(groups(&cells, |_| Value::Null, |cell, value| value.push(json!(to_rows(&cell.x.middle())))))
+}
+
+/// Each with the cᵢ of its inputs that may saturate, and whether between the samples too; `None` where they prove nothing.
+fn kept_cells(closed_loop: &ClosedLoop, sample_time_s: f64) -> Option<(Times, Vec<Value>)> {
+    [Times::All, Times::Samples].into_iter().find_map(|times| {
+        let (cells, attempt) = sampled_saturated::prove_cells(closed_loop, sample_time_s, times);
+        let by_rows = cells.groups.iter().flatten().all(|cell| cell.matrix.multipliers.is_some());
+        let multipliers = |cell: &SaturatedCell, value: &mut Vec<Value>| value.push(json!(cell.multipliers));
+        let is_proved = by_rows && matches!(attempt, Attempt::Proved(_));
+        is_proved.then(|| (times, groups(&cells, |_| Value::Null, multipliers)))
+    })
 }
 
 /// q and y with Q ⪰ qI and Y(ρ) ⪰ yI, as guesses.

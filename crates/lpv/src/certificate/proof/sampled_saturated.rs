@@ -21,20 +21,24 @@
 //!   of I, I + N/4 and I + N/2 + N²/6, plus a rest that is enclosed. Three matrices do for all times between samples. Where they are not
 //!   definite, φ(T) alone does for the times of the samples.
 //! - **all mixtures**: from F to K row i adds sᵢ(uᵢwᵢᵀ + wᵢuᵢᵀ), 0 ≤ sᵢ ≤ 1, uᵢ = (kᵢ − fᵢ, 0), wᵢ = (ηᵢ, −Tηᵢ), ηᵢ = Pφbᵢ (with Y: uᵢ
-//!   times Y and ηᵢ = φbᵢ). For any cᵢ > 0 it is at least −δᵢδᵢᵀ/(4cᵢ), δᵢ = cᵢuᵢ − 2wᵢ, because max(0, ab) ≤ (a + b)²/4. One matrix, M(φ, F) −
-//!   Σδᵢδᵢᵀ/(4cᵢ) ≻ 0, does for all 2ᵐ mixtures; where it is not definite, the mixtures are taken one by one.
+//!   times Y and ηᵢ = φbᵢ). For any cᵢ > 0 it is at least −δᵢδᵢᵀ/(4cᵢ), δᵢ = cᵢuᵢ − 2wᵢ: s(uwᵀ + wuᵀ) + δδᵀ/(4c) is for s = 0 a square,
+//!   for s = 1 the square (cu + 2w)(cu + 2w)ᵀ/(4c), and affine in between. One matrix, M(φ, F) − Σδᵢδᵢᵀ/(4cᵢ) ≻ 0, does for all 2ᵐ
+//!   mixtures, with any cᵢ > 0, and so with other cᵢ on each cell: they are taken from its middle by `rowwise::multipliers`, the same for
+//!   every φ. Where that fails even in the middle, the mixtures are taken one by one.
 //!
 //! None of this depends on the level: it is the one up to which F does not saturate.
 
 use super::closed_loop::{ClosedLoop, Form, Place};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use super::rowwise::ALL_HIGH;
+use super::rowwise::{Balanced, Rows, multipliers, shares};
 use super::sampled::{hold, rest};
+use super::sampled_witness::leaves_when_sampled;
+use super::witness::middle as middle_of;
 use super::{Attempt, Cells, LEAST_HALF};
 use crate::certificate::claim::{Claim, ClaimKind, Verdict, Words};
 use crate::math::Mat;
 use crate::math::interval::Interval;
-use crate::math::matrix::{identity, inverse, quadratic_form, symmetric_part};
+use crate::math::matrix::{identity, symmetric_part};
 use crate::math::taylor::Taylor;
 use std::time::Instant;
 
@@ -45,7 +49,7 @@ const MOST_MIXED: usize = 6;
 
 /// At which times V is not larger than at the sample before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Times {
+pub(super) enum Times {
     /// At all.
     All,
     /// At the next sample.
@@ -55,12 +59,27 @@ enum Times {
 /// M(φ, F) and what each input that may saturate adds to it, for one φ.
 struct Condition {
     matrix: TaylorMatrix,
-    /// uᵢ and wᵢ, 2n each.
-    changes: Vec<[Vec<Taylor>; 2]>,
+    /// −2wᵢ and uᵢ, 2n each: δᵢ = cᵢuᵢ − 2wᵢ.
+    rows: Rows,
 }
 
-/// The claim that the saturated, sampled loop keeps {V ≤ γ} invariant.
-pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, level: f64, sample_time_s: f64) -> Claim {
+/// What is known of a cell: not its matrices, which are large.
+pub(super) struct SaturatedCell {
+    /// Of each φ, or of each mixture of one.
+    known: Vec<Definiteness>,
+    /// cᵢ; `None` where mixtures were taken one by one. For a record.
+    pub multipliers: Option<Vec<f64>>,
+}
+
+/// The claim that the saturated, sampled loop keeps {V ≤ γ} invariant. Where it is not proved, or rests on what is not (`is_founded`), a
+/// state that leaves the set is looked for.
+pub(super) fn prove(
+    closed_loop: &ClosedLoop,
+    words: &Words,
+    level: f64,
+    sample_time_s: f64,
+    is_founded: bool,
+) -> Claim {
     let started = Instant::now();
     let kind = ClaimKind::SampledInvariance { level, sample_time_s };
     let premises = ["lyapunov-definite", "unsaturated"];
@@ -69,21 +88,19 @@ pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, level: f64, sample_
         return claim.decided(Verdict::Undecided, f64::NAN, "the sample time is not positive");
     }
     let attempt = |times: Times| {
-        let mut cells =
-            Cells::new(closed_loop.pieces, 1, |place: &Place| cell(closed_loop, place, sample_time_s, times));
-        // that a mixture fails refutes nothing
-        let attempt = cells.prove(LEAST_HALF, &|matrices: &Vec<CellMatrix>, half| {
-            let positive = |matrix: &CellMatrix| match matrix.is_positive(half) {
-                Definiteness::Refuted { .. } => Definiteness::Open { fits: 0.0 },
-                other => other,
-            };
-            matrices.iter().map(|matrix| (0.0, positive(matrix))).collect()
-        });
+        let (cells, attempt) = prove_cells(closed_loop, sample_time_s, times);
         (times, attempt, cells.len())
     };
     let all = attempt(Times::All);
     let (times, attempt, cells) = if matches!(all.1, Attempt::Proved(_)) { all } else { attempt(Times::Samples) };
-    let mut claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&premises);
+    let witness = match &attempt {
+        Attempt::Proved(_) if is_founded => None,
+        Attempt::Proved(_) => leaves_when_sampled(closed_loop, None, level, sample_time_s),
+        Attempt::Refuted { place, .. } | Attempt::Open { place } => {
+            leaves_when_sampled(closed_loop, Some(*place), level, sample_time_s)
+        }
+    };
+    let mut claim = words.claim(kind, attempt, closed_loop, cells, started).resting_on(&premises).refuted_by(witness);
     if claim.verdict == Verdict::Proved {
         let when = match times {
             Times::All => "at the samples and between them",
@@ -94,43 +111,65 @@ pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, level: f64, sample_
     claim
 }
 
-/// What has to be definite on the cell.
-fn cell(closed_loop: &ClosedLoop, place: &Place, sample_time_s: f64, times: Times) -> Vec<CellMatrix> {
+/// The cells, and what they prove.
+pub(super) fn prove_cells<'a>(
+    closed_loop: &'a ClosedLoop<'a>,
+    sample_time_s: f64,
+    times: Times,
+) -> (Cells<'a, SaturatedCell>, Attempt) {
+    let enclose = move |place: &Place| cell(closed_loop, place, sample_time_s, times);
+    let mut cells = Cells::new(closed_loop.pieces, 1, enclose);
+    let attempt = cells.prove(LEAST_HALF, &|cell: &SaturatedCell, _| {
+        cell.known.iter().map(|definiteness| (0.0, definiteness.clone())).collect()
+    });
+    (cells, attempt)
+}
+
+/// What is known of a matrix; that one fails refutes nothing, neither a mixture nor what stands for all.
+fn known(matrix: &CellMatrix, half: f64) -> Definiteness {
+    match matrix.is_positive(half) {
+        Definiteness::Refuted { .. } => Definiteness::Open { fits: 0.0 },
+        other => other,
+    }
+}
+
+/// Whether all matrices are definite on the cell, for each φ and for all mixtures at once; where that fails even in the middle, for each
+/// mixture.
+fn cell(closed_loop: &ClosedLoop, place: &Place, sample_time_s: f64, times: Times) -> SaturatedCell {
     let Place { piece, middle, half, .. } = *place;
     let at_middle = Taylor::variable_of_first_order(Interval::point(middle));
     let over = Taylor::variable(Interval::new(middle - half, middle + half));
     let [middle, over] = [at_middle, over].map(|t| conditions(closed_loop, piece, t, sample_time_s, times));
-    middle.iter().zip(&over).flat_map(|(middle, over)| matrices(middle, over)).collect()
-}
-
-/// One matrix for all mixtures, or where that is not definite in the middle, one for each.
-fn matrices(middle: &Condition, over: &Condition) -> Vec<CellMatrix> {
-    if let Some(factors) = middle.factors() {
-        // for the whole cell or not at all: both forms have to be of one function
-        let moving = over.moving();
-        let [middle, over] = [middle, over].map(|condition| condition.for_all_mixtures(&factors, &moving));
-        let one = CellMatrix::new(&middle, &over);
-        if matches!(one.is_positive(0.0), Definiteness::Proved(_)) || factors.len() > MOST_MIXED {
-            return vec![one];
-        }
+    let multipliers = multipliers(&middle.iter().map(Condition::balanced).collect::<Vec<Balanced>>());
+    // an input is left out for a whole cell or not at all: both forms have to be of one function
+    let moving = over.iter().map(|over| over.rows.moving());
+    let by_rows = |((middle, over), moving): ((&Condition, &Condition), Vec<bool>)| {
+        let [middle, over] = [middle, over].map(|condition| condition.for_all_mixtures(&multipliers, &moving));
+        known(&CellMatrix::new(&middle, &over), half)
+    };
+    let by_rows: Vec<Definiteness> = middle.iter().zip(&over).zip(moving).map(by_rows).collect();
+    let count = multipliers.len();
+    let fails = |known: &Definiteness| matches!(known, Definiteness::Open { fits } if *fits == 0.0);
+    if !by_rows.iter().any(fails) || !(1..=MOST_MIXED).contains(&count) {
+        return SaturatedCell { known: by_rows, multipliers: Some(multipliers) };
     }
-    if middle.changes.len() > MOST_MIXED {
-        return vec![CellMatrix::unbounded(middle.matrix.shape().0)];
-    }
-    let mixture = |bits: usize| CellMatrix::new(&middle.of_mixture(bits), &over.of_mixture(bits));
-    (0..1 << middle.changes.len()).map(mixture).collect()
+    let pairs = middle.iter().zip(&over).flat_map(|pair| (0..1 << count).map(move |bits| (pair, bits)));
+    let of_mixture = |((middle, over), bits): ((&Condition, &Condition), usize)| {
+        known(&CellMatrix::new(&middle.of_mixture(bits), &over.of_mixture(bits)), half)
+    };
+    SaturatedCell { known: pairs.map(of_mixture).collect(), multipliers: None }
 }
 
 /// A condition for each φ.
 fn conditions(closed_loop: &ClosedLoop, piece: usize, t: Taylor, sample_time_s: f64, times: Times) -> Vec<Condition> {
-    let (a, b, _) = closed_loop.model_and_gain(piece, t);
-    let low = closed_loop.parts(piece, 0, t);
+    let (a, b, k) = closed_loop.model_and_gain(piece, t);
+    let lyapunov = closed_loop.lyapunov(t);
+    let [low, high] = closed_loop.gains(k, 0, t);
     let saturating = closed_loop.saturating();
-    let high = (!saturating.is_empty()).then(|| closed_loop.parts(piece, ALL_HIGH, t).gain);
     // P from the left, or Y from the right
     let (left, flow) = match closed_loop.form {
-        Form::Direct(_) => (Some(&low.lyapunov), a.minus(&b.times(&low.gain))),
-        Form::Inverse(_) => (None, a.times(&low.lyapunov).minus(&b.times(&low.gain))),
+        Form::Direct(_) => (Some(&lyapunov), a.minus(&b.times(&low))),
+        Form::Inverse(_) => (None, a.times(&lyapunov).minus(&b.times(&low))),
     };
     let held = match times {
         Times::All => held_over(&a.scaled(sample_time_s)),
@@ -143,13 +182,21 @@ fn conditions(closed_loop: &ClosedLoop, piece: usize, t: Taylor, sample_time_s: 
         };
         let (h, eta) = (from_left(&flow), from_left(&b));
         let n = h.shape().0;
-        let change = |&i: &usize| {
-            let difference = |j: usize| high.as_ref().map_or(Taylor::from(0.0), |k| k.at(i, j) - low.gain.at(i, j));
-            let u = (0..2 * n).map(|j| if j < n { difference(j) } else { Taylor::from(0.0) }).collect();
-            let w = (0..2 * n).map(|j| if j < n { eta.at(j, i) } else { -(eta.at(j - n, i) * sample_time_s) });
-            [u, w.collect()]
+        let difference = |row: usize, j: usize| match j < n {
+            true => high.at(saturating[row], j) - low.at(saturating[row], j),
+            false => Taylor::from(0.0),
         };
-        Condition { matrix: block(&h, &low.lyapunov, sample_time_s), changes: saturating.iter().map(change).collect() }
+        let gradient = |row: usize, j: usize| match j < n {
+            true => eta.at(j, saturating[row]) * -2.0,
+            false => eta.at(j - n, saturating[row]) * sample_time_s * 2.0,
+        };
+        Condition {
+            matrix: block(&h, &lyapunov, sample_time_s),
+            rows: Rows {
+                gradient: TaylorMatrix::from_fn(saturating.len(), 2 * n, gradient),
+                difference: TaylorMatrix::from_fn(saturating.len(), 2 * n, difference),
+            },
+        }
     };
     held.iter().map(of).collect()
 }
@@ -196,47 +243,28 @@ fn held_over(x: &TaylorMatrix) -> Vec<TaylorMatrix> {
 }
 
 impl Condition {
-    /// cᵢ of all inputs, powers of two: near the minimum 2√(wᵢᵀM⁻¹wᵢ / uᵢᵀM⁻¹uᵢ) of what is taken from M, which is halfway between F and
-    /// K. `None` where M is not definite.
-    fn factors(&self) -> Option<Vec<f64>> {
-        let size = self.matrix.shape().0;
-        let middle = |entries: &[Taylor]| entries.iter().map(|entry| entry.value.middle()).collect::<Vec<f64>>();
-        let changes: Vec<[Vec<f64>; 2]> = self.changes.iter().map(|[u, w]| [middle(u), middle(w)]).collect();
-        let halfway = Mat::from_fn(size, size, |i, j| {
-            let added = |[u, w]: &[Vec<f64>; 2]| 0.5 * (u[i] * w[j] + w[i] * u[j]);
-            self.matrix.at(i, j).value.middle() + changes.iter().map(added).sum::<f64>()
-        });
-        let inverse = symmetric_part(&inverse(&halfway));
-        let factor = |[u, w]: &[Vec<f64>; 2]| {
-            let ratio = quadratic_form(&inverse, w) / quadratic_form(&inverse, u);
-            let factor = 2.0_f64.powi((1.0 + 0.5 * ratio.log2()).round().clamp(-500.0, 500.0) as i32);
-            // rows of F and K that agree add nothing, whatever the factor
-            if u.iter().all(|entry| *entry == 0.0) { Some(1.0) } else { (ratio > 0.0).then_some(factor) }
-        };
-        changes.iter().map(factor).collect()
-    }
-
-    /// The inputs whose rows of F and K differ somewhere, for a condition over a whole cell.
-    fn moving(&self) -> Vec<bool> {
-        self.changes.iter().map(|[u, _]| !u.iter().all(Taylor::is_zero)).collect()
+    /// The values in the middle of a cell, as numbers.
+    fn balanced(&self) -> Balanced {
+        let [gradient, difference] = self.rows.middle();
+        Balanced { base: symmetric_part(&middle_of(&self.matrix)), gradient, difference }
     }
 
     /// M(φ, F) − Σδᵢδᵢᵀ/(4cᵢ) of the inputs that are `moving`.
-    fn for_all_mixtures(&self, factors: &[f64], moving: &[bool]) -> TaylorMatrix {
-        let size = self.matrix.shape().0;
-        let changes = self.changes.iter().zip(factors).zip(moving).filter(|(_, moving)| **moving);
-        changes.fold(self.matrix.clone(), |sum, (([u, w], &c), _)| {
-            let delta = TaylorMatrix::from_fn(1, size, |_, j| u[j] * c - w[j] * 2.0);
-            sum.minus(&delta.transpose().times(&delta).scaled(0.25 / c))
-        })
+    fn for_all_mixtures(&self, multipliers: &[f64], moving: &[bool]) -> TaylorMatrix {
+        match multipliers.is_empty() {
+            true => self.matrix.clone(),
+            false => self.matrix.minus(&self.rows.deltas(multipliers, moving).quadratic(&shares(multipliers))),
+        }
     }
 
     /// M(φ, S) with the rows of K of the inputs whose bits are set.
     fn of_mixture(&self, bits: usize) -> TaylorMatrix {
+        let Rows { gradient, difference } = &self.rows;
+        let chosen = |i: &usize| bits >> i & 1 == 1;
+        let rows: Vec<usize> = (0..gradient.shape().0).filter(chosen).collect();
         let size = self.matrix.shape().0;
-        let chosen = self.changes.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1);
-        chosen.fold(self.matrix.clone(), |sum, (_, [u, w])| {
-            let product = TaylorMatrix::from_fn(size, size, |i, j| u[i] * w[j]);
+        rows.iter().fold(self.matrix.clone(), |sum, &i| {
+            let product = TaylorMatrix::from_fn(size, size, |j, k| difference.at(i, j) * gradient.at(i, k) * -0.5);
             sum.plus(&product).plus(&product.transpose())
         })
     }
