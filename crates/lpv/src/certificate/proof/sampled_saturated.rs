@@ -125,7 +125,7 @@ fn matrices(middle: &Condition, over: &Condition) -> Vec<CellMatrix> {
 fn conditions(closed_loop: &ClosedLoop, piece: usize, t: Taylor, sample_time_s: f64, times: Times) -> Vec<Condition> {
     let (a, b, _) = closed_loop.model_and_gain(piece, t);
     let low = closed_loop.parts(piece, 0, t);
-    let saturating = closed_loop.saturating();
+    let saturating = if crate::mutant::is("sampled-low-only") { Vec::new() } else { closed_loop.saturating() };
     let high = (!saturating.is_empty()).then(|| closed_loop.parts(piece, ALL_HIGH, t).gain);
     // P from the left, or Y from the right
     let (left, flow) = match closed_loop.form {

@@ -1,34 +1,16 @@
 //! Plants whose matrices turn with a parameter: frozen designs and designs for a rate, low and high gain.
 
-use super::attack;
 use super::linear::regulator;
+use super::{around, attack};
 use crate::Tally;
 use crate::loops::{Family, Loop, Scheduled};
 use crate::numbers::Numbers;
 use lpv::certificate::ProofOptions;
 use lpv::controller::Schedule;
-use lpv::math::Mat;
 use lpv::math::matrix::inverse_spd;
 use lpv::model::{BasisFunction, MatrixFunction};
 use lpv::synthesis::RateBounded;
 use std::f64::consts::{PI, TAU};
-
-/// M₀ and small multiples of random matrices with the other basis functions.
-fn around(
-    numbers: &mut Numbers,
-    center: &Mat<f64>,
-    basis: &[BasisFunction],
-    size: f64,
-    symmetric: bool,
-) -> MatrixFunction {
-    let (rows, columns) = (center.nrows(), center.ncols());
-    let coefficients = (0..basis.len()).map(|k| match (k, symmetric) {
-        (0, _) => center.clone(),
-        (_, true) => size * numbers.symmetric(rows),
-        (_, false) => size * numbers.matrix(rows, columns),
-    });
-    MatrixFunction { coefficients: coefficients.collect(), basis: basis.to_vec() }
-}
 
 /// A loop, what is asked of it, and values of the parameter.
 pub fn generate(numbers: &mut Numbers) -> Option<(Loop, ProofOptions, Vec<f64>)> {

@@ -2,6 +2,7 @@
 
 use super::attack;
 use crate::Tally;
+use crate::exact::{Dyadic, Exact};
 use crate::loops::{Linear, level, limits};
 use crate::numbers::Numbers;
 use lpv::certificate::{Claim, ClaimKind, ProofOptions, Verdict};
@@ -126,5 +127,30 @@ pub fn sampled(numbers: &mut Numbers, linear: &Linear, claim: &Claim) -> Result<
             Ok(())
         }
         _ => Ok(()),
+    }
+}
+
+/// Whether the sampled loop of one or two integrators is stable, exactly; `None` of other plants.
+pub fn sampled_exactly(linear: &Linear) -> Option<bool> {
+    let Linear { a, b, k, sample_time_s, .. } = linear;
+    let one = Dyadic::from(1.0);
+    let t = Dyadic::from(*sample_time_s);
+    match a.nrows() {
+        1 if a[(0, 0)] == 0.0 => {
+            let gain = Exact::of(b).times(&Exact::of(k)).scalar();
+            Some(one.exceeds(&(&one - &(&gain * &t)).abs()))
+        }
+        2 if a[(0, 1)] == 1.0 && a[(0, 0)] == 0.0 && a[(1, 0)] == 0.0 && a[(1, 1)] == 0.0 && b[(0, 0)] == 0.0 => {
+            // x₊ = [1, T; 0, 1]x − [T²/2; T] b₂ kx
+            let half = &(&t.square() * &Dyadic::from(0.5)) * &Dyadic::from(b[(1, 0)]);
+            let whole = &t * &Dyadic::from(b[(1, 0)]);
+            let [k1, k2] = [0, 1].map(|j| Dyadic::from(k[(0, j)]));
+            let m = [[&one - &(&half * &k1), &t - &(&half * &k2)], [-&(&whole * &k1), &one - &(&whole * &k2)]];
+            let trace = &m[0][0] + &m[1][1];
+            let determinant = &(&m[0][0] * &m[1][1]) - &(&m[0][1] * &m[1][0]);
+            // Jury
+            Some(one.exceeds(&determinant.abs()) && (&one + &determinant).exceeds(&trace.abs()))
+        }
+        _ => None,
     }
 }

@@ -1,9 +1,15 @@
 //! The kinds of cases.
 
+mod edge;
 mod family;
+mod gain;
+mod governed;
 mod linear;
+mod mutation;
 mod narrow;
 mod polytope;
+mod sampled;
+mod weights;
 
 use crate::Tally;
 use crate::conditions::{Bounds, check};
@@ -11,6 +17,8 @@ use crate::flight::{Flown, Frozen};
 use crate::loops::{Loop, sides};
 use crate::numbers::Numbers;
 use lpv::certificate::{Claim, ClaimKind, Motion, ProofOptions, Verdict, prove};
+use lpv::math::Mat;
+use lpv::model::{BasisFunction, MatrixFunction};
 
 /// A kind of cases.
 pub struct Kind {
@@ -20,11 +28,45 @@ pub struct Kind {
 }
 
 pub const KINDS: &[Kind] = &[
-    Kind { name: "linear", cases: 4500, run: linear::case },
+    Kind { name: "linear", cases: 2600, run: linear::case },
     Kind { name: "family", cases: 500, run: family::case },
     Kind { name: "narrow", cases: 700, run: narrow::case },
-    Kind { name: "polytope", cases: 4500, run: polytope::case },
+    Kind { name: "edge", cases: 1200, run: edge::case },
+    Kind { name: "polytope", cases: 2600, run: polytope::case },
+    Kind { name: "weights", cases: 800, run: weights::case },
+    Kind { name: "sampled", cases: 600, run: sampled::case },
+    Kind { name: "gain", cases: 250, run: gain::case },
+    Kind { name: "governed", cases: 250, run: governed::case },
+    Kind { name: "mutation", cases: 1500, run: mutation::case },
 ];
+
+/// M₀ and small multiples of random matrices with the powers of ρ up to `degree`.
+pub fn polynomials(
+    numbers: &mut Numbers,
+    center: &Mat<f64>,
+    degree: u32,
+    size: f64,
+    symmetric: bool,
+) -> MatrixFunction {
+    around(numbers, center, &BasisFunction::powers(0, degree), size, symmetric)
+}
+
+/// M₀ and small multiples of random matrices with the other basis functions.
+pub fn around(
+    numbers: &mut Numbers,
+    center: &Mat<f64>,
+    basis: &[BasisFunction],
+    size: f64,
+    symmetric: bool,
+) -> MatrixFunction {
+    let (rows, columns) = (center.nrows(), center.ncols());
+    let coefficients = (0..basis.len()).map(|k| match (k, symmetric) {
+        (0, _) => center.clone(),
+        (_, true) => size * numbers.symmetric(rows),
+        (_, false) => size * numbers.matrix(rows, columns),
+    });
+    MatrixFunction { coefficients: coefficients.collect(), basis: basis.to_vec() }
+}
 
 /// The claim of this name about the model, if it is proved.
 pub fn proved<'a>(claims: &'a [Claim], name: &str) -> Option<&'a Claim> {
