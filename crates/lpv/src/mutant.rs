@@ -13,7 +13,6 @@ pub const fn is(_: &str) -> bool {
 #[cfg(feature = "mutants")]
 pub fn is(name: &str) -> bool {
     static CHOSEN: std::sync::LazyLock<Option<String>> = std::sync::LazyLock::new(|| std::env::var("LPV_MUTANT").ok());
-    debug_assert!(TABLE.iter().any(|(known, _)| *known == name), "{name} is not in the table");
     CHOSEN.as_deref() == Some(name)
 }
 

@@ -152,7 +152,7 @@ pub struct Loop {
 }
 
 /// What a design without a parameter is made of.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Linear {
     pub a: Mat<f64>,
     pub b: Mat<f64>,

@@ -115,6 +115,10 @@ fn main() {
         return;
     }
     exact::check();
+    #[cfg(feature = "mutants")]
+    if arguments.iter().any(|argument| argument == "--mutants") {
+        return mutants();
+    }
     if let Ok(text) = std::env::var("SOUNDNESS_REPLAY") {
         match replay(&text) {
             Ok(()) => println!("{text}: nothing disagrees"),
@@ -128,6 +132,28 @@ fn main() {
     let share: Option<f64> =
         std::env::var("SOUNDNESS_SHARE").ok().map(|text| text.parse().expect("SOUNDNESS_SHARE is a number"));
     std::process::exit(attack(share));
+}
+
+/// Print the names of the prover's defects; each has a hook, and each hook is in the table.
+#[cfg(feature = "mutants")]
+fn mutants() {
+    fn hooks(folder: &std::path::Path, names: &mut std::collections::BTreeSet<String>) {
+        for entry in std::fs::read_dir(folder).expect("the sources") {
+            let path = entry.expect("a file").path();
+            if path.is_dir() {
+                hooks(&path, names);
+            } else {
+                let text = std::fs::read_to_string(&path).expect("a source");
+                let name = |part: &str| part.split('"').next().unwrap_or_default().to_owned();
+                names.extend(text.split("mutant::is(\"").skip(1).map(name));
+            }
+        }
+    }
+    let mut found = std::collections::BTreeSet::new();
+    hooks(&std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut found);
+    let known: std::collections::BTreeSet<String> = lpv::mutant::TABLE.iter().map(|(name, _)| (*name).into()).collect();
+    assert_eq!(found, known, "hooks and table differ");
+    lpv::mutant::TABLE.iter().for_each(|(name, what)| println!("{name}\t{what}"));
 }
 
 /// Run all cases, or a share of each kind; the exit code.

@@ -16,9 +16,12 @@ use lpv::synthesis::polytopic::InputBounds;
 
 /// Vertices around a stabilisable pair, a gain and a P from its Riccati equation.
 pub fn generate(numbers: &mut Numbers) -> Option<PolytopicClaim> {
+    if numbers.once_in(10) {
+        return opposed(numbers);
+    }
     let is_coarse = numbers.once_in(3);
     let n = if is_coarse { 1 } else { numbers.of(&[1, 2, 2, 3, 4]) };
-    let m = if numbers.once_in(100) { 64 } else { 1 + numbers.below(3) };
+    let m = if numbers.once_in(300) { 64 } else { 1 + numbers.below(3) };
     let count = numbers.of(&[1, 2, 2, 3, 4]);
     let size = 2.0_f64.powi(-(numbers.below(10) as i32));
     // numbers that meet edges exactly
@@ -87,6 +90,29 @@ pub fn generate(numbers: &mut Numbers) -> Option<PolytopicClaim> {
         weights: (numbers.below(4) > 0).then_some(weights),
         saturation,
     })
+}
+
+/// Two vertices whose inputs act in opposite directions, with gains to match: halfway no input acts, and a alone is left.
+fn opposed(numbers: &mut Numbers) -> Option<PolytopicClaim> {
+    let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+    let [b, k, p] = [0, 1, 2].map(|_| 0.5 + numbers.unit());
+    let weights = CostWeights { q: scalar(1.0), r: scalar(0.25) };
+    // the decrease halfway is −2pa, and the cost asks for q
+    let a = match numbers.below(2) {
+        0 => -(1.5 * numbers.unit()) / (2.0 * p),
+        _ => 0.3 * numbers.next(),
+    };
+    let polytope = Polytope::new(vec![scalar(a); 2], vec![scalar(b), scalar(-b)]).ok()?;
+    let gain = vec![scalar(k), scalar(-k)];
+    let lyapunov = match numbers.below(2) {
+        0 => PolytopicLyapunov::Common { p: scalar(p), gain },
+        _ => PolytopicLyapunov::ParameterDependent {
+            y: vec![scalar(1.0 / p); 2],
+            l: gain.iter().map(|k| (1.0 / p) * k).collect(),
+            rate_vertices: vec![vec![1.0, -1.0], vec![-1.0, 1.0]],
+        },
+    };
+    Some(PolytopicClaim { polytope, lyapunov, auxiliary_gain: None, weights: Some(weights), saturation: None })
 }
 
 pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {

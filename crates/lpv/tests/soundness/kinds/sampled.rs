@@ -6,7 +6,7 @@ use super::linear::{sampled, sampled_exactly};
 use crate::Tally;
 use crate::loops::Linear;
 use crate::numbers::Numbers;
-use lpv::certificate::{ClaimKind, ProofOptions, Verdict};
+use lpv::certificate::{Claim, ClaimKind, ProofOptions, Verdict};
 use lpv::controller::InputLimits;
 use lpv::math::Mat;
 use lpv::math::matrix::{from_rows, identity, symmetric_part};
@@ -14,6 +14,9 @@ use lpv::math::riccati;
 use lpv::synthesis::CostWeights;
 
 pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
+    if numbers.once_in(4) {
+        return of_the_first_order(numbers, tally);
+    }
     let n = 1 + numbers.below(2);
     let a = if n == 1 { Mat::zeros(1, 1) } else { from_rows(&[vec![0.0, 1.0], vec![0.0, 0.0]]) };
     let b = Mat::from_fn(n, 1, |i, _| f64::from(u8::from(i + 1 == n)));
@@ -69,4 +72,47 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// ẋ = ax + bu, u = −kx held for T: x₊ = (e^{aT} − bk(e^{aT} − 1)/a)x, at the edge −1 or near it; exactly on it where a = 0.
+fn of_the_first_order(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
+    let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+    let (a, b) = (numbers.of(&[0.0, 1.0, -1.0]) * (0.2 + numbers.unit()), 0.5 + numbers.unit());
+    let off = numbers.of(&[0.0, 1e-13, -1e-13, 1e-6, -1e-6, 1e-3, -1e-3, 0.02, -0.02]);
+    let (b, k, sample_time_s) = if a == 0.0 {
+        let [b, k] = [0, 1].map(|_| 2.0_f64.powi(numbers.below(9) as i32 - 4));
+        (b, k, 2.0 / (b * k) * (1.0 + off))
+    } else {
+        let sample_time_s = 0.2 + 1.5 * numbers.unit();
+        let growth = (a * sample_time_s).exp_m1();
+        (b, a * (growth + 2.0) / (b * growth) * (1.0 + off), sample_time_s)
+    };
+    let linear = Linear {
+        a: scalar(a),
+        b: scalar(b),
+        weights: CostWeights { q: scalar(1.0), r: scalar(1.0) },
+        p: scalar(1.0),
+        k: scalar(k),
+        f: None,
+        limits: InputLimits::none(1),
+        operating: vec![0.0],
+        gamma: None,
+        sample_time_s,
+    };
+    let of = linear.build().ok_or("the plant cannot be built")?;
+    let claims = attack(numbers, tally, &of, &ProofOptions::default(), &[0.0])?;
+    let kind = |claim: &&Claim| matches!(claim.kind, ClaimKind::SampledStability { .. });
+    let claim = claims.iter().find(kind).ok_or("nothing is said of the sampled loop")?;
+    // 1 − |λ|, to rounding
+    let factor = (a * sample_time_s).exp() - if a == 0.0 { 0.0 } else { b * k * (a * sample_time_s).exp_m1() / a };
+    let inside = match sampled_exactly(&linear) {
+        Some(true) => f64::INFINITY,
+        Some(false) => f64::NEG_INFINITY,
+        None => 1.0 - factor.abs(),
+    };
+    match claim.verdict {
+        Verdict::Proved if inside < -1e-12 => Err(format!("{} is proved, and λ is {factor}", claim.id)),
+        Verdict::Refuted if inside > 1e-12 => Err(format!("{} is refuted, and λ is {factor}", claim.id)),
+        _ => Ok(()),
+    }
 }
