@@ -13,6 +13,10 @@ pub mod controller;
 pub mod estimator;
 pub mod math;
 pub mod model;
+#[cfg(not(feature = "mutants"))]
+mod mutant;
+#[cfg(feature = "mutants")]
+pub mod mutant;
 pub mod plant;
 pub mod sim;
 pub mod synthesis;

@@ -46,6 +46,7 @@ pub use sampled_cost::{SampledCost, prove_sampled_cost};
 use super::claim::{Claim, ClaimKind, Of, Verdict, Witness, Words, settle};
 use crate::math::decimal::{about, at_least};
 use crate::math::interval::Interval;
+use crate::mutant;
 use crate::plant::Plant;
 use crate::synthesis::Design;
 use closed_loop::{ClosedLoop, Place, Row};
@@ -119,6 +120,7 @@ fn worse(a: Attempt, b: Attempt) -> Attempt {
 
 impl<'a, M: Send + Sync> Cells<'a, M> {
     fn new(pieces: usize, variants: usize, enclose: impl Fn(&Place) -> M + Sync + 'a) -> Self {
+        let pieces = if mutant::is("last-piece-skipped") && pieces > 1 { pieces - 1 } else { pieces };
         let groups: Vec<(usize, usize)> =
             (0..pieces).flat_map(|piece| (0..variants).map(move |v| (piece, v))).collect();
         let first = |&(piece, variant): &(usize, usize)| {
@@ -196,7 +198,7 @@ fn step_through<M>(
     };
     let mut half = narrower(whole.half, fits);
     // what is left may be no more than the overlap
-    while to - from > OVERLAP {
+    while to - from > if mutant::is("last-cell-skipped") { 1.5 * half } else { OVERLAP } {
         let judged = if half < least {
             Err(Attempt::Open { place: Place { middle: from, half, ..whole } })
         } else {
@@ -331,6 +333,7 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         let kind = match (place, level) {
             (0, None) => ClaimKind::Decrease { motion },
             (0, Some(level)) => ClaimKind::Invariance { level, motion },
+            _ if mutant::is("cost-factor-lowered") => ClaimKind::Cost { factor: 1.0, level, motion },
             _ => ClaimKind::Cost { factor, level, motion },
         };
         let premises: &[&str] = match (place, level) {
@@ -449,6 +452,7 @@ fn definite(closed_loop: &ClosedLoop, words: &Words) -> Claim {
     let started = Instant::now();
     let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| closed_loop.bordered(place, None));
     let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
+    let attempt = if mutant::is("definiteness-assumed") { Attempt::Proved(0.5) } else { attempt };
     let witness = closed_loop.witness(&attempt);
     words.claim(ClaimKind::LyapunovDefinite, attempt, closed_loop, cells.len(), started).refuted_by(witness)
 }
@@ -482,6 +486,7 @@ fn unsaturated(
             closed_loop.bordered(place, Some((Row::Limited(rows[place.variant]), Interval::point(1.0) / level)))
         });
         let attempt = cells.prove(LEAST_HALF, &|matrix: &CellMatrix, half| vec![(0.0, matrix.is_positive(half))]);
+        let attempt = if mutant::is("level-unchecked") { Attempt::Proved(0.5) } else { attempt };
         (level, attempt, cells.len())
     };
     let mut attempts = LEVELS.into_iter().map(|factor| attempt(factor * gamma));
@@ -490,6 +495,7 @@ fn unsaturated(
         Attempt::Proved(_) => first,
         _ => attempts.find(|(_, attempt, _)| matches!(attempt, Attempt::Proved(_))).unwrap_or(first),
     };
+    let level = if mutant::is("level-not-lowered") { gamma } else { level };
     let is_proved = matches!(attempt, Attempt::Proved(_));
     let witness = closed_loop.saturates(&attempt, &rows);
     let kind = ClaimKind::Unsaturated { level };

@@ -69,6 +69,12 @@ impl InputLimits {
             .map(|i| {
                 let below = self.min[i].map_or(f64::INFINITY, |min| difference(operating_input[i], min));
                 let above = self.max[i].map_or(f64::INFINITY, |max| difference(max, operating_input[i]));
+                if crate::mutant::is("larger-side") {
+                    return below.max(above);
+                }
+                if crate::mutant::is("one-sided-is-free") && below.max(above).is_infinite() {
+                    return f64::INFINITY;
+                }
                 below.min(above).max(0.0)
             })
             .collect()

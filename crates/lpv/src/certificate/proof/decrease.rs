@@ -8,6 +8,7 @@ use super::matrix::{CellMatrix, Definiteness};
 use super::rowwise::{ALL_HIGH, separable};
 use super::{Attempt, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH, RATE_RATIO, RATES};
 use crate::math::Mat;
+use crate::mutant;
 
 /// κ and c of the claim κV̇ + c(xᵀQx + sᵀRs) < 0.
 type Weights = [f64; 2];
@@ -142,7 +143,14 @@ impl ByRows {
 
 /// The claims are affine in the rate: its ends are enough.
 fn ends(rate: f64) -> Vec<f64> {
-    if rate == 0.0 { vec![0.0] } else { vec![-rate, rate] }
+    if rate == 0.0 || mutant::is("rate-dropped") {
+        return vec![0.0];
+    }
+    if mutant::is("rate-one-end") {
+        return vec![rate];
+    }
+    let rate = if mutant::is("rate-halved") { 0.5 * rate } else { rate };
+    vec![-rate, rate]
 }
 
 /// κρ̇, away from zero: what holds for more holds for less.

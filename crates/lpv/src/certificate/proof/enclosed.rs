@@ -14,7 +14,9 @@ use crate::math::Mat;
 use crate::math::interval::Interval;
 
 /// υ, the relative error of one operation.
-const UNIT: f64 = 0.5 * f64::EPSILON;
+fn unit() -> f64 {
+    if crate::mutant::is("rounding-off") { 0.0 } else { 0.5 * f64::EPSILON }
+}
 /// More than all that sums and products of up to a million terms that are not negative lose to rounding.
 const ROUNDED_UP: f64 = 1.0 + 1e-9;
 /// More than what underflow takes from a product.
@@ -50,7 +52,7 @@ impl Enclosed {
         let terms = terms.filter(|(weight, _)| *weight != 0.0);
         let (mut middle, mut radius) = (vec![0.0; n * n], vec![0.0; n * n]);
         // of the products and sums of the middles
-        let lost = 2.0 * (terms.clone().count() + 1) as f64 * UNIT;
+        let lost = 2.0 * (terms.clone().count() + 1) as f64 * unit();
         for (weight, matrix) in terms {
             for at in 0..n * n {
                 let term = weight * matrix.middle[at];
@@ -70,7 +72,7 @@ impl Enclosed {
         let (left, right, _) = terms[0];
         let (inner, columns) = (left.columns, right.columns);
         let rows = left.middle.len() / inner;
-        let lost = (terms.len() * inner + 4) as f64 * 2.0 * UNIT;
+        let lost = (terms.len() * inner + 4) as f64 * 2.0 * unit();
         let mut sums = vec![Interval::point(0.0); rows * columns];
         // of the right factors: |g| and what is multiplied by |f|
         let sizes: Vec<(Vec<f64>, Vec<f64>)> = (terms.iter())
@@ -138,7 +140,7 @@ impl Enclosed {
             }
         }
         // |F|ᵀ1, (R + c|M|) of it, |F| of that
-        let lost = (2 * n + 4) as f64 * UNIT * ROUNDED_UP;
+        let lost = (2 * n + 4) as f64 * unit() * ROUNDED_UP;
         let (mut columns, mut largest) = (vec![0.0; n], 0.0_f64);
         for i in 0..n {
             for (sum, f) in columns.iter_mut().zip(&factor[i * n..=i * n + i]) {

@@ -40,7 +40,7 @@ pub fn prove_gain(model: &InputOutputModel, bound: &GainBound) -> Claim {
     };
     let mut cells = Cells::new(PIECES, 1, enclose);
     let rates = match bound.rate {
-        Some(rate) if rate > 0.0 => vec![-rate, rate],
+        Some(rate) if rate > 0.0 && !crate::mutant::is("gain-rate-dropped") => vec![-rate, rate],
         _ => vec![0.0],
     };
     let mut first = None;
@@ -65,6 +65,7 @@ pub fn prove_gain(model: &InputOutputModel, bound: &GainBound) -> Claim {
         first.unwrap_or((bound.gain, Attempt::Open { place: Place { piece: 0, variant: 0, middle: 0.0, half: 1.0 } }));
     let motion = bound.rate.map_or(Motion::Any, |rate| Motion::Bounded { rate });
     let parameter = |place: &Place| low + place.middle * step.middle();
+    let gain = if crate::mutant::is("gain-lowered") { bound.gain } else { gain };
     let mut claim = Claim::new(ClaimKind::InducedGain { gain, motion }, Of::Model, &Words::default());
     match attempt {
         Attempt::Proved(margin) => {

@@ -7,6 +7,7 @@ use crate::math::interval::Interval;
 use crate::math::matrix::cholesky_inverse;
 use crate::math::taylor::{Taylor, TaylorDual};
 use crate::model::MatrixFunction;
+use crate::mutant;
 
 /// A matrix of functions of the cell's variable, in row order.
 #[derive(Clone, Debug)]
@@ -202,17 +203,21 @@ impl CellMatrix {
     pub fn is_positive(&self, half: f64) -> Definiteness {
         let n = self.n;
         let middle = self.middle();
-        let Some(inverse) = cholesky_inverse(&middle) else { return self.refutation(&middle) };
+        let Some(inverse) = cholesky_inverse(&middle) else {
+            return if mutant::is("margin-sign") { Definiteness::Proved(0.5) } else { self.refutation(&middle) };
+        };
         // Tᵀ = L⁻¹, row order
         let factor: Vec<f64> = (0..n * n).map(|at| inverse[(at / n, at % n)]).collect();
-        let half = Interval::point(half);
+        let half = Interval::point(if mutant::is("cells-by-their-middle") { 0.0 } else { half });
         let [constant, linear, quadratic] = [(&self.value, 1.0), (&self.slope, 0.0), (&self.bend, 0.0)]
             .map(|(matrix, identity)| matrix.row_sums_of_congruence(&factor, identity));
         let point = Interval::point;
         let sums: Vec<[Interval; 3]> =
             (0..n).map(|i| [point(constant[i]), point(linear[i]), point(quadratic[i]) * 0.5]).collect();
         let excess = |[constant, linear, quadratic]: &[Interval; 3]| {
-            (*constant + half * *linear + half.square() * *quadratic).hi()
+            let linear = if mutant::is("slope-dropped") { Interval::point(0.0) } else { half * *linear };
+            let rest = mutant::is("remainder-dropped").then_some(Interval::point(0.0));
+            (*constant + linear + rest.unwrap_or_else(|| half.square() * *quadratic)).hi()
         };
         let largest = sums.iter().map(excess).fold(0.0, f64::max);
         if largest < 1.0 {
@@ -236,7 +241,7 @@ impl CellMatrix {
         let form = (0..n * n).fold(Interval::point(0.0), |sum, at| {
             sum + self.value.at(at / n, at % n) * (Interval::point(direction[at / n]) * direction[at % n])
         });
-        match form.hi() < 0.0 {
+        match if mutant::is("lower-end-refutes") { form.lo() } else { form.hi() } < 0.0 {
             true => Definiteness::Refuted { direction, value: form.hi() },
             false => Definiteness::Open { fits: 0.0 },
         }

@@ -25,6 +25,7 @@ use crate::math::interval::Interval;
 use crate::math::matrix::symmetric_part;
 use crate::math::taylor::Taylor;
 use crate::model::Polytope;
+use crate::mutant;
 use crate::synthesis::CostWeights;
 use crate::synthesis::polytopic::InputBounds;
 use std::time::Instant;
@@ -173,7 +174,9 @@ impl<'a> Sums<'a> {
 
     /// σ of input `i`; infinite where it is not limited.
     fn sigma(&self, i: usize) -> f64 {
-        self.claim.saturation.as_ref().map_or(f64::INFINITY, |bounds| bounds.sigma[i])
+        let free = |sigma: &[f64]| mutant::is("one-free-frees-all") && sigma.contains(&f64::INFINITY);
+        let bounds = self.claim.saturation.as_ref().filter(|bounds| !free(&bounds.sigma));
+        bounds.map_or(f64::INFINITY, |bounds| bounds.sigma[i])
     }
 
     /// The inputs that may saturate: limited, of a high gain.
@@ -206,12 +209,14 @@ impl<'a> Sums<'a> {
             rates: Vec::new(),
             is_motion: true,
         };
-        if self.claim.lyapunov.matrices().iter().any(|matrix| asymmetry(matrix).is_some()) {
+        let is_symmetric = |matrix: &Mat<f64>| asymmetry(matrix).is_none() || mutant::is("asymmetry-tolerated");
+        if !self.claim.lyapunov.matrices().iter().all(is_symmetric) {
             // V is not a quadratic form of these numbers
             let claim = Claim::new(ClaimKind::LyapunovDefinite, Of::Model, &words());
             return claim.decided(Verdict::Undecided, f64::NAN, "P or Y is not symmetric to the last digit");
         }
-        let conditions: Vec<Condition> = self.lyapunov.iter().enumerate().map(at).collect();
+        let mut conditions: Vec<Condition> = self.lyapunov.iter().enumerate().map(at).collect();
+        conditions.truncate(if mutant::is("definiteness-assumed") { 0 } else { usize::MAX });
         decide(ClaimKind::LyapunovDefinite, Instant::now(), &conditions, |condition, direction, value| {
             Some(condition.witness(self.state(&condition.weights, direction), value))
         })
@@ -240,7 +245,8 @@ impl<'a> Sums<'a> {
                 is_motion: true,
             }
         });
-        let conditions: Vec<Condition> = conditions.collect();
+        let mut conditions: Vec<Condition> = conditions.collect();
+        conditions.truncate(if mutant::is("level-unchecked") { 0 } else { usize::MAX });
         let kind = ClaimKind::Unsaturated { level: gamma };
         // the multiple of the direction with V = γ passes the limit, see `witness`
         decide(kind, Instant::now(), &conditions, |condition, direction, value| {
@@ -315,7 +321,7 @@ impl<'a> Sums<'a> {
                 let [square, bound] = [input.magnitude(), self.sigma(i)].map(|x| Interval::point(x).square());
                 !self.sigma(i).is_finite() || (square * level).hi() < (bound * size.lo()).lo()
             };
-            if size.lo() <= 0.0 || !inputs.iter().enumerate().all(stays) {
+            if size.lo() <= 0.0 || !inputs.iter().enumerate().all(stays) && !mutant::is("witness-saturates") {
                 return None;
             }
         }
@@ -385,7 +391,10 @@ impl<'a> Sums<'a> {
     /// Pairs of vertices, each with itself too.
     fn pairs(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         let count = self.len();
-        (0..count).flat_map(move |i| (i..count).map(move |j| [i, j]))
+        let skips = move |[i, j]: [usize; 2]| {
+            mutant::is("vertex-skipped") && i == j && i > 0 && i + 1 == count || mutant::is("pair-skipped") && i != j
+        };
+        (0..count).flat_map(move |i| (i..count).map(move |j| [i, j])).filter(move |&pair| !skips(pair))
     }
 
     /// The conditions under saturation, see `rowwise.rs`: δᵢ is affine in ρ, so that Σ δᵢᵀδᵢ/(4cᵢ) is a double sum too. Halfway stands the
@@ -461,7 +470,8 @@ impl<'a> Sums<'a> {
         };
         // of the sums, four times the cost halfway
         let stage = cost.map(|CostWeights { q, r }| {
-            let input = s[i].plus(&s[j]).quadratic(r);
+            let forgotten = mutant::is("input-cost-forgotten").then(|| Mat::zeros(r.nrows(), r.ncols()));
+            let input = s[i].plus(&s[j]).quadratic(forgotten.as_ref().unwrap_or(r));
             match self.is_common() {
                 true => input.plus(&times(&TaylorMatrix::constant(q), 4.0)),
                 false => input.plus(&self.lyapunov(i).plus(self.lyapunov(j)).quadratic(q)),
@@ -482,7 +492,7 @@ impl<'a> Sums<'a> {
         } else {
             let both = self.flow(i, j, s, rates).plus(&self.flow(j, i, s, rates));
             at = less(ii.plus(&jj).plus(&both), 1.0);
-            matrix = less(both, 0.5);
+            matrix = less(both, if mutant::is("pair-cost-halved") { 0.25 } else { 0.5 });
         }
         Condition { matrix, at, weights: halfway, rates: rates_of_claim, is_motion: true }
     }

@@ -36,6 +36,7 @@ use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::interval::Interval;
 use crate::math::matrix::{cholesky_inverse, diagonal, identity, inverse_spd, quadratic_form};
 use crate::math::taylor::Taylor;
+use crate::mutant;
 
 /// Inputs that may saturate up to which all mixtures of rows are tried where the condition by rows does not prove.
 const MOST_ENUMERATED: usize = 10;
@@ -51,6 +52,9 @@ const INSIDE: f64 = 1.05;
 
 /// Number of mixtures of rows where `saturating` inputs may saturate; `None` where there are too many to enumerate.
 pub(super) fn mixtures(saturating: usize) -> Option<usize> {
+    if mutant::is("low-mixture-only") {
+        return Some(1);
+    }
     (saturating <= MOST_ENUMERATED).then(|| 1 << saturating)
 }
 
@@ -74,7 +78,7 @@ pub(super) fn separable(r: &Mat<f64>, saturating: &[usize]) -> Mat<f64> {
         for &j in &saturating[at + 1..] {
             let coupling = r[(i, j)].abs().max(r[(j, i)].abs());
             (bound[(i, j)], bound[(j, i)]) = (0.0, 0.0);
-            if coupling != 0.0 {
+            if coupling != 0.0 && !mutant::is("coupling-dropped") {
                 let tau = positive((r[(i, i)] / r[(j, j)]).sqrt());
                 let raised = |entry: f64, by: Interval| (Interval::point(entry) + by).hi();
                 bound[(i, i)] = raised(bound[(i, i)], Interval::point(coupling) * tau);
@@ -103,7 +107,8 @@ impl Rows {
         let n = high.shape().1;
         let rows =
             |matrix: &TaylorMatrix| TaylorMatrix::from_fn(saturating.len(), n, |i, j| matrix.at(saturating[i], j));
-        let flow = |i: usize, j: usize| -input.at(saturating[i], j) * (2.0 * factor);
+        let two = if mutant::is("factor-two-missing") { 1.0 } else { 2.0 };
+        let flow = |i: usize, j: usize| -input.at(saturating[i], j) * (two * factor);
         let gradient = if cost == 0.0 {
             TaylorMatrix::from_fn(saturating.len(), n, flow)
         } else {
@@ -117,7 +122,8 @@ impl Rows {
     /// The inputs with dᵢ ≠ 0 somewhere, for rows over a whole cell: of the others nothing is taken, whatever g is.
     pub fn moving(&self) -> Vec<bool> {
         let (count, n) = self.difference.shape();
-        (0..count).map(|i| (0..n).any(|j| !self.difference.at(i, j).is_zero())).collect()
+        let moves = |i: usize| (0..n).any(|j| !self.difference.at(i, j).is_zero()) && !mutant::is("saturation-is-free");
+        (0..count).map(moves).collect()
     }
 
     /// δᵢ = gᵢ + cᵢdᵢ of the inputs that are `moving`, else zero.
@@ -137,7 +143,8 @@ impl Rows {
 
 /// The matrix with 1/(4cᵢ) on its diagonal, rounded up: more than that proves too.
 pub(super) fn shares(multipliers: &[f64]) -> Mat<f64> {
-    diagonal(&multipliers.iter().map(|c| (0.25 / c).next_up()).collect::<Vec<f64>>())
+    let share = if mutant::is("share-halved") { 0.125 } else { 0.25 };
+    diagonal(&multipliers.iter().map(|c| (share / c).next_up()).collect::<Vec<f64>>())
 }
 
 /// A matrix M_F with the rows gᵢ and dᵢ that take from it, as numbers.

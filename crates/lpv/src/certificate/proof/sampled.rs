@@ -43,6 +43,7 @@ struct SampledCell {
 pub(super) fn prove(closed_loop: &ClosedLoop, words: &Words, sample_time_s: f64) -> Claim {
     let started = Instant::now();
     let kind = ClaimKind::SampledStability { sample_time_s };
+    let sample_time_s = if crate::mutant::is("sampled-time-halved") { 0.5 * sample_time_s } else { sample_time_s };
     let mut cells = Cells::new(closed_loop.pieces, 1, |place: &Place| cell(closed_loop, place, sample_time_s));
     let attempt = cells.prove(LEAST_HALF, &|cell: &SampledCell, half| {
         if cell.looks_unstable {
@@ -188,7 +189,7 @@ fn series(x: &TaylorMatrix) -> TaylorMatrix {
     let n = x.shape().0;
     let mut power = TaylorMatrix::constant(&identity(n));
     let mut series = power.clone();
-    for k in 1..=TERMS {
+    for k in 1..=if crate::mutant::is("sampled-series-cut") { 1 } else { TERMS } {
         power = power.times(x);
         power = TaylorMatrix::from_fn(n, n, |i, j| power.at(i, j) / (k + 1) as f64);
         // of a nilpotent A the series ends

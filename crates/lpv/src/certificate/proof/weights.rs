@@ -15,6 +15,7 @@ pub(super) fn claim(weights: &CostWeights, words: &Words) -> Claim {
         (Some(Definiteness::Positive | Definiteness::Semidefinite), Some(Definiteness::Positive)) => {
             (Verdict::Proved, r)
         }
+        (Some(_), Some(Definiteness::Positive)) if crate::mutant::is("q-indefinite") => (Verdict::Proved, r),
         (Some(_), Some(_)) => (Verdict::Refuted, q.min(r)),
         _ => (Verdict::Undecided, f64::NAN),
     };
