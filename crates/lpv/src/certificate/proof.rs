@@ -25,11 +25,8 @@ mod sampled_constant;
 mod sampled_cost;
 mod sampled_saturated;
 mod sampled_spectrum;
-<<<<<<< HEAD
-mod value;
-=======
 mod sampled_witness;
->>>>>>> 8113a8d8881cbedf4c190448d0ffb20ba0391fe8
+mod value;
 mod weights;
 mod witness;
 
@@ -363,15 +360,12 @@ pub fn prove(design: &Design, plant: &dyn Plant, options: &ProofOptions) -> Resu
         claims.push(Claim::new(ClaimKind::AsAsked { what: "rate", asked: rate, proved }, Of::Model, &words));
     }
     claims.push(sampled::prove(&closed_loop, &words, design.sample_time_s));
-<<<<<<< HEAD
-    claims.extend(level.map(|level| sampled_saturated::prove(&closed_loop, &words, level, design.sample_time_s)));
-    if !closed_loop.has_parameter {
-        claims.push(sampled_cost::claim(&closed_loop, &words, level, design.sample_time_s));
-=======
     if let Some(level) = level {
         let is_founded = claims.iter().all(|c| c.id.name != "unsaturated" || c.verdict == Verdict::Proved);
         claims.push(sampled_saturated::prove(&closed_loop, &words, level, design.sample_time_s, is_founded));
->>>>>>> 8113a8d8881cbedf4c190448d0ffb20ba0391fe8
+    }
+    if !closed_loop.has_parameter {
+        claims.push(sampled_cost::claim(&closed_loop, &words, level, design.sample_time_s));
     }
     let mut nonlinear = None;
     if options.nonlinear {

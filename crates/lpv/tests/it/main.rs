@@ -13,10 +13,7 @@ mod proofs;
 mod quadrotor;
 mod records;
 mod rowwise;
-<<<<<<< HEAD
-mod sampled_cost;
-=======
 mod sampled;
->>>>>>> 8113a8d8881cbedf4c190448d0ffb20ba0391fe8
+mod sampled_cost;
 mod synthesis;
 mod tensor_product;

@@ -1,6 +1,6 @@
 //! Verdicts carried over from premises.
 
-use super::{Claim, Verdict};
+use super::{Claim, ClaimKind, Verdict};
 
 /// Carry the verdicts on premises over: a claim is proved only if each of its premises is, and numerical at best if one is; a premise
 /// that is refuted, undecided or missing leaves it undecided, and is named.

@@ -176,9 +176,11 @@ impl<'a> ClosedLoop<'a> {
         let weights = &design.weights;
         let has_parameter = scheduling.is_some();
         let limits = &design.controller.limits;
-<<<<<<< HEAD
         let operating_input = &design.controller.operating_input;
-        let sigma = limits.room(operating_input);
+        let mut sigma = limits.room(operating_input);
+        if mutant::is("one-free-frees-all") && sigma.contains(&f64::INFINITY) {
+            sigma.fill(f64::INFINITY);
+        }
         Ok(Self {
             plant,
             schedule,
@@ -193,13 +195,6 @@ impl<'a> ClosedLoop<'a> {
             pieces,
             has_parameter,
         })
-=======
-        let mut sigma = limits.room(&design.controller.operating_input);
-        if mutant::is("one-free-frees-all") && sigma.contains(&f64::INFINITY) {
-            sigma.fill(f64::INFINITY);
-        }
-        Ok(Self { plant, schedule, weights, limits, sigma, form, auxiliary, low, step, pieces, has_parameter })
->>>>>>> 1e43ffbe60c3b0b928950d9c40d6b4755de6b799
     }
 
     /// Whether the gain that flies may saturate on the set, so that input `i` lies between rows of F and K.

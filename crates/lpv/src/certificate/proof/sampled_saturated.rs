@@ -162,17 +162,10 @@ fn cell(closed_loop: &ClosedLoop, place: &Place, sample_time_s: f64, times: Time
 
 /// A condition for each φ.
 fn conditions(closed_loop: &ClosedLoop, piece: usize, t: Taylor, sample_time_s: f64, times: Times) -> Vec<Condition> {
-<<<<<<< HEAD
     let (a, b, k) = closed_loop.model_and_gain(piece, t);
     let lyapunov = closed_loop.lyapunov(t);
     let [low, high] = closed_loop.gains(k, 0, t);
-    let saturating = closed_loop.saturating();
-=======
-    let (a, b, _) = closed_loop.model_and_gain(piece, t);
-    let low = closed_loop.parts(piece, 0, t);
     let saturating = if crate::mutant::is("sampled-low-only") { Vec::new() } else { closed_loop.saturating() };
-    let high = (!saturating.is_empty()).then(|| closed_loop.parts(piece, ALL_HIGH, t).gain);
->>>>>>> 1e43ffbe60c3b0b928950d9c40d6b4755de6b799
     // P from the left, or Y from the right
     let (left, flow) = match closed_loop.form {
         Form::Direct(_) => (Some(&lyapunov), a.minus(&b.times(&low))),
