@@ -56,6 +56,7 @@ mod assembly;
 mod balancing;
 mod block;
 mod cholesky;
+mod coefficients;
 mod conditioning;
 mod dense;
 mod direction;
@@ -68,9 +69,11 @@ pub mod guide;
 mod interior_point;
 mod lanczos;
 mod lowering;
+mod multiplier;
 mod operators;
 mod options;
 mod problem;
+mod reach;
 mod report;
 mod rigorous;
 mod schur;
@@ -83,7 +86,8 @@ mod vectorized;
 mod verification;
 
 pub use answer::{
-    Answer, Balancing, BlockReport, InaccurateReason, IterationLog, OptimumBound, Outcome, Ray, Residuals, Witness,
+    Answer, Balancing, BlockReport, InaccurateReason, IterationLog, OptimumBound, Outcome, Ray, Residuals, Tolerance,
+    Witness,
 };
 pub use error::Error;
 pub use explanation::{Carrier, Explanation};

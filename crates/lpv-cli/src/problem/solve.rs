@@ -209,7 +209,8 @@ fn report(
 ) -> Report {
     let severity = |design: &PolytopicDesign| match design.answer.outcome {
         _ if design.is_infeasible() => 3,
-        Outcome::Unbounded(_) => 2,
+        Outcome::InfeasibleWithin(_) => 3,
+        Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_) => 2,
         Outcome::Inaccurate(_) => 1,
         _ => 0,
     };
@@ -281,12 +282,12 @@ fn report(
 }
 
 fn status(design: &PolytopicDesign) -> &'static str {
-    match design.answer.outcome {
+    let outcome = &design.answer.outcome;
+    match outcome {
         _ if design.is_infeasible() => "infeasible",
-        Outcome::Solved => "solved",
-        Outcome::Infeasible(_) => "infeasible",
-        Outcome::Unbounded(_) => "unbounded",
-        Outcome::Inaccurate(_) => "inaccurate",
+        // what is claimed of a design are its inequalities, not that there is no better one
+        _ if outcome.is_feasible() => "solved",
+        _ => outcome.word(),
     }
 }
 
@@ -311,29 +312,42 @@ fn verdict(plan: &ProblemPlan, design: &PolytopicDesign, inside: Option<bool>) -
     if let Some(point) = &design.unstabilizable {
         return (Verdict::Refuted, unstabilizable(plan, point));
     }
+    let feasible = design.answer.outcome.is_feasible();
     match (&design.answer.outcome, &plan.scope, inside) {
-        (Outcome::Solved, _, Some(false)) => {
+        (_, _, Some(false)) if feasible => {
             (Verdict::Undecided, "the initial state is outside the certified set: x(0)'P x(0) > gamma, and nothing is claimed from there".into())
         }
-        (Outcome::Solved, Scope::Frozen, _) if plan.models.len() > 1 => (
+        (_, Scope::Frozen, _) if feasible && plan.models.len() > 1 => (
             Verdict::Undecided,
             "frozen design: the inequalities hold at each point for a parameter at rest; nothing is claimed once it moves".into(),
         ),
-        (Outcome::Solved, Scope::Polytope(Lyapunov::ParameterDependent { .. }), _) => (
+        (_, Scope::Polytope(Lyapunov::ParameterDependent { .. }), _) if feasible => (
             Verdict::Numerical,
             "verified for Y and L at all vertices, for every parameter in the polytope with a rate in the hull of the rate vertices; K is rounded; lpv certify proves the file of -o".into(),
         ),
-        (Outcome::Solved, _, _) => {
+        _ if feasible => {
             (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope; K is rounded; lpv certify proves the file of -o".into())
         }
         (Outcome::Inaccurate(reason), _, _) => {
             (Verdict::Undecided, format!("the solver stopped short: {reason}"))
         }
         (Outcome::Infeasible(_), _, _) => (Verdict::Refuted, "no solution exists: the witness contradicts the inequalities".into()),
-        (Outcome::Unbounded(_), _, _) => {
+        (Outcome::InfeasibleWithin(witness), _, _) => (Verdict::Undecided, within(witness)),
+        (Outcome::Solved | Outcome::SolvedToTolerance(_), _, _) => {
+            (Verdict::Undecided, "the point that was found misses an inequality by a rounding error".into())
+        }
+        (Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_), _, _) => {
             (Verdict::Undecided, "the objective grows without end: some state costs nothing; give it a positive weight in Q".into())
         }
     }
+}
+
+/// What a witness that does not exclude everything does exclude.
+fn within(witness: &Witness) -> String {
+    format!(
+        "no solution was found, and none exists with entries up to {} times the problem's units",
+        at_least(witness.excluded_radius)
+    )
 }
 
 /// Why a point of the polytope excludes every design, in words.
@@ -385,7 +399,11 @@ fn witness(design: &PolytopicDesign) -> Option<Vec<NamedMultiplier>> {
         let each = |(i, &share): (usize, &f64)| NamedMultiplier { name: name(i), multiplier: multiplier(share) };
         return Some(weights.iter().enumerate().map(each).collect());
     }
-    let Outcome::Infeasible(Witness { multipliers, .. }) = &answer.outcome else { return None };
+    let (Outcome::Infeasible(Witness { multipliers, .. }) | Outcome::InfeasibleWithin(Witness { multipliers, .. })) =
+        &answer.outcome
+    else {
+        return None;
+    };
     let named = |(z, block): (&Mat<f64>, &lmi::BlockReport)| NamedMultiplier {
         name: block.name.clone(),
         multiplier: to_rows(z),

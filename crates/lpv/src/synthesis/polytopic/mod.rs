@@ -180,7 +180,7 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     problem.maximize(&t);
     let terms = sum.stability_terms();
     let answer = problem.solve(&solver())?;
-    let solved = matches!(answer.outcome, Outcome::Solved);
+    let solved = answer.outcome.is_optimal();
     if solved && answer.objective > LEAST_MARGIN {
         return finish(&problem, answer, &unknowns, None);
     }
@@ -289,7 +289,8 @@ fn regulate(
     }
     request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
     let answer = problem.solve(&solver())?;
-    if matches!(answer.outcome, Outcome::Inaccurate(_) | Outcome::Infeasible(_)) {
+    let contradicts = matches!(answer.outcome, Outcome::Infeasible(_) | Outcome::InfeasibleWithin(_));
+    if contradicts || matches!(answer.outcome, Outcome::Inaccurate(_)) {
         let stabilization = stabilize(polytope, request)?;
         if stabilization.is_infeasible() {
             return Ok(stabilization);
@@ -368,7 +369,7 @@ fn finish(
 ) -> Result<PolytopicDesign, SynthesisError> {
     let explanation = problem.explain(&answer, &solver())?;
     let solution = match answer.outcome {
-        Outcome::Solved | Outcome::Inaccurate(_) => {
+        Outcome::Solved | Outcome::SolvedToTolerance(_) | Outcome::Inaccurate(_) => {
             let values =
                 |of: &[Expr]| -> Vec<Mat<f64>> { of.iter().map(|expression| answer.value(expression)).collect() };
             let y: Vec<Mat<f64>> = values(&unknowns.y).iter().map(symmetric_part).collect();
@@ -384,7 +385,10 @@ fn finish(
                 p,
             })
         }
-        Outcome::Infeasible(_) | Outcome::Unbounded(_) => None,
+        Outcome::Infeasible(_)
+        | Outcome::InfeasibleWithin(_)
+        | Outcome::Unbounded(_)
+        | Outcome::UnboundedToTolerance(_) => None,
     };
     Ok(PolytopicDesign { answer, explanation, unstabilizable: None, solution })
 }
