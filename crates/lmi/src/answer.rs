@@ -16,7 +16,7 @@ pub enum Outcome {
     /// p ([`Answer::attained`]) is attained, and no x has a better one than d ([`Answer::optimum_bound`], for all x or those within its reach), with
     ///
     /// ```text
-    /// |p − d| / (1 + |p| + |d|) ≤ 10⁻⁶.
+    /// |p − d| / (1 + |p| + |d|) ≤ 10⁻⁵.
     /// ```
     ///
     /// The solver's own estimate of this gap is at most 10⁻⁷ ([`Residuals::gap`]; what [`Options::back_off`](crate::Options::back_off) gives up comes on top).
@@ -97,7 +97,8 @@ pub struct Witness {
     /// coefficients are about 1. ∞ where every x is, which is what [`Outcome::Infeasible`] says; at least 1e10 otherwise.
     pub excluded_radius: f64,
     /// Whether what is excluded are points with `F_b(x) ⪰ margin·I`, for the default margins of strict inequalities ([`BlockReport::margin`]),
-    /// and not all with `F_b(x) ≻ 0`.
+    /// and not all with `F_b(x) ≻ 0`. So only where the inequalities that contradict each other have no known part: then x, multiplied to the excluded
+    /// radius, has blocks less definite than the margin.
     pub needs_margin: bool,
     /// Smallest eigenvalue over all `Z_b`, recomputed. Not negative beyond rounding.
     pub smallest_eigenvalue: f64,

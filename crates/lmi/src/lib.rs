@@ -48,7 +48,8 @@
 //! # Outcomes
 //!
 //! Infeasible, unbounded and inaccurate are outcomes ([`Outcome`]), not errors: they carry a witness, a ray or the
-//! best point with its residuals. [`Error`] is for problems that have no meaning. The [`guide`] has a page on each.
+//! best point with its residuals. [`Outcome::Solved`], [`Outcome::Infeasible`] and [`Outcome::Unbounded`] are proved of the data as they were read,
+//! rounding included; what cannot be proved has a softer word. [`Error`] is for problems that have no meaning. The [`guide`] has a page on each.
 
 mod aligned;
 mod answer;
@@ -62,6 +63,7 @@ mod dense;
 mod direction;
 mod double_double;
 mod error;
+mod estimate;
 mod explanation;
 mod expression;
 mod factored;

@@ -7,13 +7,14 @@
 //! ```
 
 use crate::Mat;
+use crate::estimate;
 use crate::rigorous::Enclosure;
 use crate::verification::{Spectrum, largest_entry};
 
 /// Share of the estimated smallest eigenvalue that is proved.
 const SHARE: f64 = 0.5;
-/// Steps of the estimate by inverse iteration.
-const STEPS: usize = 4;
+/// Least eigenvalue of a scaled multiplier that counts.
+const LEAST: f64 = 1e-200;
 /// Largest binary exponent of a scaling factor.
 const MOST: i32 = 400;
 
@@ -86,53 +87,20 @@ fn weights(z: &Mat<f64>) -> Option<Vec<f64>> {
     // Products of powers of two with entries of at most √(zⱼⱼ zₖₖ): what underflows is caught by the error that the proof allows.
     let powers: Vec<f64> = exponents.iter().map(|&e| 2.0_f64.powi(e)).collect();
     let scaled = Mat::from_fn(rows.len(), rows.len(), |i, j| z[(rows[i], rows[j])] * powers[i] * powers[j]);
-    let lambda = SHARE * smallest_eigenvalue(&scaled)?;
-    if !(lambda > 0.0 && Enclosure::of_matrix(&scaled).exceeds(lambda)) {
+    let enclosure = Enclosure::of_matrix(&scaled);
+    let estimate = SHARE * estimate::smallest_eigenvalue(&scaled).unwrap_or(0.0);
+    let lambda = if estimate > 0.0 && enclosure.exceeds(estimate) {
+        estimate
+    } else {
+        enclosure.smallest_eigenvalue_bound(&Spectrum::of(&scaled))
+    };
+    // Far above what underflow may have done to the scaled entries.
+    if !(lambda > LEAST) {
         return None;
     }
     let mut weights = vec![f64::INFINITY; n];
     rows.iter().zip(&powers).for_each(|(&j, d)| weights[j] = 1.001 * d * d / lambda);
     Some(weights)
-}
-
-/// An estimate from a Cholesky factorisation and inverse iteration, mostly from above; `None` where there is no factor.
-fn smallest_eigenvalue(m: &Mat<f64>) -> Option<f64> {
-    let n = m.nrows();
-    let mut l: Vec<f64> = (0..n).flat_map(|j| m.col_as_slice(j).iter().copied()).collect();
-    for k in 0..n {
-        let pivot = l[k + k * n];
-        if !(pivot > 0.0 && pivot.is_finite()) {
-            return None;
-        }
-        let root = pivot.sqrt();
-        l[k * n + k..(k + 1) * n].iter_mut().for_each(|entry| *entry /= root);
-        let (done, left) = l.split_at_mut((k + 1) * n);
-        let column = &done[k * n..];
-        for j in k + 1..n {
-            let factor = column[j];
-            let target = &mut left[(j - k - 1) * n + j..(j - k) * n];
-            target.iter_mut().zip(&column[j..]).for_each(|(a, b)| *a -= factor * b);
-        }
-    }
-    let mut x: Vec<f64> = (0..n).map(|i| 1.0 + 0.3 * ((7 * i + 3) % 11) as f64 / 11.0).collect();
-    let mut estimate = f64::INFINITY;
-    for _ in 0..STEPS {
-        let length = x.iter().map(|x| x * x).sum::<f64>().sqrt();
-        x.iter_mut().for_each(|x| *x /= length);
-        for k in 0..n {
-            let column = &l[k * n..(k + 1) * n];
-            x[k] /= column[k];
-            let solved = x[k];
-            x[k + 1..].iter_mut().zip(&column[k + 1..]).for_each(|(x, l)| *x -= solved * l);
-        }
-        for k in (0..n).rev() {
-            let column = &l[k * n..(k + 1) * n];
-            let inner: f64 = x[k + 1..].iter().zip(&column[k + 1..]).map(|(x, l)| x * l).sum();
-            x[k] = (x[k] - inner) / column[k];
-        }
-        estimate = 1.0 / x.iter().map(|x| x * x).sum::<f64>().sqrt();
-    }
-    estimate.is_finite().then_some(estimate)
 }
 
 #[cfg(test)]

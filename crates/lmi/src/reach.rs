@@ -12,10 +12,11 @@
 //! The bounds come from the entries of the blocks, one unknown at a time:
 //! diagonal entries are not negative, which bounds unknowns where the others in the entry are bounded; and entries are at most
 //! `√(Gⱼⱼ Gₖₖ)`, with Gⱼⱼ bounded by the unknowns in it or by `wⱼ τ` ([`Multiplier`]). An unknown that stands alone in an entry, or with
-//! bounded ones, is bounded with it. Coefficients are taken with what rounding may have done to them.
+//! bounded ones, is bounded with it; those that never do are bounded together. Coefficients are taken with what rounding may have done to them.
 
 use crate::multiplier::Multiplier;
 use crate::report::Original;
+use crate::{Mat, estimate};
 
 /// Rounds of bounds from diagonal entries.
 const ROUNDS: usize = 6;
@@ -23,6 +24,8 @@ const ROUNDS: usize = 6;
 const IMPROVEMENTS: usize = 1;
 /// A coefficient that rounding leaves less of than this is no pivot.
 const LEAST_PIVOT: f64 = 0.5;
+/// Most unknowns that are bounded together.
+const MOST_INDEPENDENT: usize = 400;
 /// Absolute error of a coefficient by underflow.
 const UNDERFLOW: f64 = 1e-290;
 
@@ -288,6 +291,7 @@ impl Entries {
                 }
             }
         }
+        self.add_independent(&mut reach, about, &size);
         for _ in 0..IMPROVEMENTS {
             for entry in self.entries.iter() {
                 let terms = &self.terms[entry.terms.clone()];
@@ -304,6 +308,88 @@ impl Entries {
             }
         }
         reach
+    }
+
+    /// Bounds on the unknowns that are left, from all entries that hold them at once: with M the coefficients, rows scaled by what bounds the
+    /// entries and columns to length 1, `|x|₂ ≤ |entries|₂ / σ_min(M)`. λ_min(MᵀM) is proved by a Cholesky factorisation in `f64`: one that ends is that of
+    /// a matrix that differs by at most n γ, γ = (n + 1)υ/(1 − (n + 1)υ), for diagonal entries of at most 1 (Demmel 1989).
+    fn add_independent(&self, reach: &mut Reach, about: f64, size: &dyn Fn(&Entry) -> (f64, f64)) {
+        let mut columns = vec![usize::MAX; self.unknowns];
+        let mut open = Vec::new();
+        for term in &self.terms {
+            let unknown = term.unknown as usize;
+            if reach.a[unknown].is_infinite() && columns[unknown] == usize::MAX {
+                columns[unknown] = open.len();
+                open.push(unknown);
+            }
+        }
+        let n = open.len();
+        if n == 0 || n > MOST_INDEPENDENT {
+            return;
+        }
+        // Σ over the entries of A² and B², where the scaled entry is at most A + Bτ.
+        let (mut a_square, mut b_square, mut error_square) = (0.0, 0.0, vec![0.0; n]);
+        let mut rows: Vec<Vec<(usize, f64)>> = Vec::new();
+        for entry in &self.entries {
+            let terms = &self.terms[entry.terms.clone()];
+            let (mut a, mut b) = size(entry);
+            if !(a.is_finite() && b.is_finite()) || terms.iter().all(|t| columns[t.unknown as usize] == usize::MAX) {
+                continue;
+            }
+            a += entry.constant.abs() + entry.error;
+            for term in terms.iter().filter(|t| columns[t.unknown as usize] == usize::MAX) {
+                a += term.most() * reach.a[term.unknown as usize];
+                b += term.most() * reach.b[term.unknown as usize];
+            }
+            let scale = 1.0 / (a + b * about);
+            if !(scale.is_finite() && scale > 0.0) {
+                continue;
+            }
+            a_square += (a * scale).powi(2);
+            b_square += (b * scale).powi(2);
+            let mut row = Vec::new();
+            for term in terms {
+                let column = columns[term.unknown as usize];
+                if column != usize::MAX {
+                    row.push((column, term.value * scale));
+                    error_square[column] += (term.error * scale).powi(2);
+                }
+            }
+            rows.push(row);
+        }
+        let mut lengths = vec![0.0; n];
+        rows.iter().flatten().for_each(|&(column, value)| lengths[column] += value * value);
+        let units: Vec<f64> = lengths.iter().map(|square| 1.0 / square.sqrt()).collect();
+        if !units.iter().all(|unit| unit.is_finite()) {
+            return;
+        }
+        let mut gram = Mat::<f64>::zeros(n, n);
+        for row in &rows {
+            for &(j, v) in row {
+                for &(i, u) in row {
+                    gram[(i, j)] += u * units[i] * (v * units[j]);
+                }
+            }
+        }
+        let Some(estimate) = estimate::smallest_eigenvalue(&gram) else { return };
+        let shift = 0.5 * estimate;
+        let mut shifted: Vec<f64> = (0..n).flat_map(|j| gram.col_as_slice(j).iter().copied()).collect();
+        (0..n).for_each(|i| shifted[i + i * n] -= shift);
+        if !estimate::cholesky(n, &mut shifted) {
+            return;
+        }
+        let size = n as f64;
+        // Of the factorisation, and of the entries of MᵀM, sums of as many terms as there are rows.
+        let rounding = 4.0 * f64::EPSILON * size * (size + rows.len() as f64 + 8.0);
+        let errors: f64 = error_square.iter().zip(&units).map(|(square, unit)| square * unit * unit).sum();
+        let least = (shift - rounding).max(0.0).sqrt() - 1.001 * errors.sqrt() - 8.0 * f64::EPSILON * size.sqrt();
+        if !(least > 0.0) {
+            return;
+        }
+        let (a, b) = (1.001 * a_square.sqrt() / least, 1.001 * b_square.sqrt() / least);
+        for (&unknown, unit) in open.iter().zip(&units) {
+            (reach.a[unknown], reach.b[unknown]) = (1.001 * unit * a, 1.001 * unit * b);
+        }
     }
 
     /// Bounds on each unknown from diagonal entries alone, which are not negative.

@@ -12,7 +12,7 @@ use crate::multiplier::Multiplier;
 use crate::rigorous::{Enclosure, SumOfProducts};
 use crate::verification::{Spectrum, square};
 use crate::{Mat, Options};
-use optimum::{Bracket, bracket};
+use optimum::{Bracket, Optimal, bracket};
 use unbounded::Endless;
 
 /// A problem as it was stated: `F_b(x) = C_b + Σ xᵢ F_{b,i}`, objective `constant + sign · cᵀx`.
@@ -80,8 +80,7 @@ pub(crate) fn report(
             (values, blocks, proof) = (between, backed_off, inner);
         }
     }
-    let multipliers: Vec<Mat<f64>> =
-        result.point.z.iter().zip(&blocks).map(|(z, block)| square(z, block.size)).collect();
+    let multipliers = squares(&result.point.z, &blocks);
     let stated = |objective: f64| translation.objective_constant + translation.sign * objective;
     let dual_objective = stated(result.dual_objective);
     let mut residuals = result.residuals;
@@ -95,7 +94,10 @@ pub(crate) fn report(
             residuals.gap = residuals.gap.max(relative(objective));
             let converged = objective.is_finite() && residuals.gap <= SOLVED_GAP;
             if converged && proof.tolerated {
-                bounds = bracket(original, translation, &blocks, &multipliers, &values, proof.proved);
+                let central = result.centre.as_ref().map(|centre| squares(&centre.z, &blocks));
+                let feasible = proof.proved;
+                let point = Optimal { values: &values, multipliers: &multipliers, central, feasible };
+                bounds = bracket(original, translation, &blocks, &point);
                 let gap = bounds.gap(translation.sign);
                 let solved = proof.proved && gap <= PROVED_GAP;
                 let tolerance = Tolerance { violation: proof.violation, gap };
@@ -145,11 +147,16 @@ pub(crate) fn report(
     }
 }
 
+/// Blocks of the solver as square matrices.
+fn squares(z: &[Vec<f64>], blocks: &[BlockReport]) -> Vec<Mat<f64>> {
+    z.iter().zip(blocks).map(|(z, block)| square(z, block.size)).collect()
+}
+
 /// Relative change of the objective that backing off may cost.
 const BACK_OFF: f64 = 3e-8;
 
 /// Largest relative distance of the two proved bounds on the optimum of what is called solved.
-const PROVED_GAP: f64 = 1e-6;
+const PROVED_GAP: f64 = 1e-5;
 
 /// What is proved of a point.
 #[derive(Clone, Copy, Debug)]

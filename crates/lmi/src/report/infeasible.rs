@@ -33,8 +33,9 @@ pub(super) fn infeasible(
             return Some(Outcome::Infeasible(witness));
         }
     }
-    let witness = within(original, blocks, &without_negligible(&z, 0.0)?, units)?;
-    Some(Outcome::InfeasibleWithin(witness))
+    let multipliers = NEGLIGIBLE.into_iter().filter_map(|share| without_negligible(&z, share));
+    let mut witnesses = multipliers.filter_map(|multipliers| within(original, blocks, &multipliers, units));
+    witnesses.next().map(Outcome::InfeasibleWithin)
 }
 
 /// The multipliers, proved to be semidefinite, with rows that are as good as zero set to zero.
@@ -64,9 +65,9 @@ fn everywhere(
         return None;
     }
     let strict = (0..blocks.len()).any(|block| original.strict(block) && multipliers[block].trace() > 0.0);
-    let homogeneous = strict && (0..blocks.len()).all(|block| original.is_homogeneous(block));
     let shared = taken(&misses, &reach.a);
-    let contradicts = known + error + shared < 0.0 || (homogeneous && shared == 0.0);
+    let vanishes = strict && is_homogeneous(original, multipliers) && shared == 0.0;
+    let contradicts = known + error + shared < 0.0 || vanishes;
     if !contradicts {
         return None;
     }
@@ -81,14 +82,23 @@ fn within(
     units: &[f64],
 ) -> Option<Witness> {
     let AtZero { total, known, error } = at_zero(original, blocks, multipliers.iter().map(|z| &z.matrix));
-    // Where the default margins of strict inequalities decide, what they leave is excluded, and no more.
+    // Where the default margins of strict inequalities decide, what they leave is excluded, and no more. That says something only where the
+    // known part itself has no share in the matter: x may then be multiplied by any number, and it is relative to the size of x that F(x) is small.
     let needs_margin = known > -0.5 * total.abs();
+    if needs_margin && !is_homogeneous(original, multipliers) {
+        return None;
+    }
     let least = if needs_margin { total } else { known };
     let bounds = original.gradient_bounds(multipliers, false);
     let reach: f64 = bounds.iter().zip(units).map(|(bound, unit)| bound * unit).sum();
     let excluded_radius = 0.999 * -(least + error) / reach;
     let holds = excluded_radius >= EXCLUDED && excluded_radius.is_finite();
     holds.then(|| report(multipliers, &bounds, excluded_radius, needs_margin))
+}
+
+/// Whether Σ⟨C_b, Z_b⟩ is zero because every C_b that is weighed is.
+fn is_homogeneous(original: &dyn Original, multipliers: &[Multiplier]) -> bool {
+    multipliers.iter().enumerate().all(|(block, z)| z.trace() == 0.0 || original.is_homogeneous(block))
 }
 
 /// Upper bounds on the equations' residuals, zero for unknowns that no multiplier weighs.
