@@ -6,45 +6,108 @@ use crate::interior_point::Centre;
 use serde::Serialize;
 use std::fmt;
 
-/// How a solve ended.
+/// How a solve ended: what is proved of the data as they were read, rounding included, and softer words where less is.
+///
+/// The data are the doubles of the expressions or of the file, of blocks their symmetric parts. Write `G_b(x) = F_b(x) − margin_b·I` with the
+/// margin that was given, zero for strict inequalities and files.
 #[derive(Clone, Debug, Serialize)]
 pub enum Outcome {
-    /// Optimal: the relative duality gap is at most 1e-7 (by default it aims for 1e-8), what the dual residual leaves uncertain of it at
-    /// most 1e-6, the residuals are within tolerance, and of every block, recomputed from the data as stated, a lower bound on the smallest eigenvalue is
-    /// **proved** ([`BlockReport::verified_lower_bound`]) that is positive for strict inequalities, at least the margin (up to rounding) where one
-    /// was given, and for [`Sdp`](crate::sdpa::Sdp) at least −tolerance·(1 + ‖F₀‖).
+    /// Optimal, and proved: `G_b(x) ⪰ 0` for every block at the answer's x (`≻ 0` for strict inequalities), so that its objective
+    /// p ([`Answer::attained`]) is attained, and no x has a better one than d ([`Answer::optimum_bound`], for all x or those within its reach), with
+    ///
+    /// ```text
+    /// |p − d| / (1 + |p| + |d|) ≤ 10⁻⁵.
+    /// ```
+    ///
+    /// The solver's own estimate of this gap is at most 10⁻⁷ ([`Residuals::gap`]; what [`Options::back_off`](crate::Options::back_off) gives up comes on top).
     Solved,
-    /// No point satisfies all inequalities; the witness shows why.
+    /// Optimal up to rounding; what is missing to `Solved` is said by [`Tolerance`]. So end problems without interior, such as those with equations as
+    /// pairs of inequalities: whether a feasible point exists at all is then not known.
+    SolvedToTolerance(Tolerance),
+    /// Proved: no x satisfies all inequalities.
     Infeasible(Witness),
-    /// The objective improves without end along the ray.
+    /// Proved: no x of a limited size satisfies all inequalities; the limit is [`Witness::excluded_radius`].
+    InfeasibleWithin(Witness),
+    /// Proved: the point of the answer is feasible, and from it the objective improves without end along the ray.
     Unbounded(Ray),
+    /// The objective improves along the ray as far as rounding lets see. Either the blocks may fall along it by what rounding leaves, and
+    /// the objective may end far out, or no feasible point was proved.
+    UnboundedToTolerance(Ray),
     /// The solver stopped short. The answer holds the best point so far with its true residuals.
     Inaccurate(InaccurateReason),
 }
 
-/// A proof that no x satisfies all inequalities `F_b(x) = C_b + Σ xᵢ F_{b,i} ⪰ 0`.
+impl Outcome {
+    /// Whether there is an optimal point, proved or up to rounding.
+    pub fn is_optimal(&self) -> bool {
+        matches!(self, Self::Solved | Self::SolvedToTolerance(_))
+    }
+
+    /// Whether the point of the answer is optimal up to rounding at least, and proved to satisfy every inequality.
+    pub fn is_feasible(&self) -> bool {
+        match self {
+            Self::Solved => true,
+            Self::SolvedToTolerance(tolerance) => tolerance.violation == 0.0,
+            _ => false,
+        }
+    }
+
+    /// The word for it: `solved`, `solved to tolerance`, `infeasible`, `infeasible within a radius`, `unbounded`, `unbounded to tolerance` or
+    /// `inaccurate`.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Solved => "solved",
+            Self::SolvedToTolerance(_) => "solved to tolerance",
+            Self::Infeasible(_) => "infeasible",
+            Self::InfeasibleWithin(_) => "infeasible within a radius",
+            Self::Unbounded(_) => "unbounded",
+            Self::UnboundedToTolerance(_) => "unbounded to tolerance",
+            Self::Inaccurate(_) => "inaccurate",
+        }
+    }
+}
+
+/// What is proved of a point that is optimal up to rounding.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Tolerance {
+    /// Proved: `G_b(x) ⪰ −violation·I` for every block. Zero where the point is proved to be feasible.
+    pub violation: f64,
+    /// Proved relative distance of the objective that is attained from the bound on the optimum, `|p − d| / (1 + |p| + |d|)`; ∞ where one of the
+    /// two is not proved.
+    pub gap: f64,
+}
+
+/// A proof that no x satisfies all inequalities `G_b(x) = C_b + Σ xᵢ F_{b,i} ⪰ 0`.
 ///
-/// Matrices `Z_b ⪰ 0` with `Σ_b⟨C_b, Z_b⟩ = −1` and `Σ_b⟨F_{b,i}, Z_b⟩ = 0` for every i: then
-/// `Σ_b⟨F_b(x), Z_b⟩ = −1` for all x, though it could not be negative if every `F_b(x)` were positive semidefinite.
+/// Matrices `Z_b ⪰ 0`, proved, with `κ = Σ_b⟨C_b, Z_b⟩ ≈ −1` and `rᵢ = Σ_b⟨F_{b,i}, Z_b⟩ ≈ 0`: in exact arithmetic
+/// `Σ_b⟨G_b(x), Z_b⟩ = −1` for all x, though it could not be negative if every `G_b(x)` were positive semidefinite. Computed multipliers miss the
+/// equations by rᵢ, and exclude
+///
+/// * every x, where `|xᵢ| ≤ aᵢ + bᵢτ` is proved of feasible ones with τ = Σ_b⟨G_b(x), Z_b⟩, `Σ|rᵢ|bᵢ < 1` and `κ + Σ|rᵢ|aᵢ < 0`: the blocks
+///   themselves, or the weight that Z gives their diagonals, bound the unknowns;
+/// * otherwise every x with `κ + Σ|rᵢ||xᵢ| < 0`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Witness {
     /// `Z_b` for every inequality in the order stated, symmetric positive semidefinite.
     #[serde(serialize_with = "nested_rows")]
     pub multipliers: Vec<Mat<f64>>,
-    /// Proved upper bound on `|Σ_b⟨F_{b,i}, Z_b⟩|` over all i. Zero in exact arithmetic; the witness excludes all x with
-    /// `Σ|xᵢ| < 1/residual`.
+    /// Proved upper bound on `|rᵢ|` over all i.
     pub residual: f64,
-    /// What the witness is proved to exclude, in sensible units: all x with `|xᵢ| ≤ excluded_radius · sᵢ`, where sᵢ is the unit of
-    /// xᵢ in the balanced problem, in which coefficients are about 1. At least 1e10; [`Outcome::Infeasible`] is not
-    /// claimed for less.
+    /// Proved to be excluded: all x with `|xᵢ| ≤ excluded_radius · sᵢ`, where sᵢ is the unit of xᵢ in the balanced problem, in which
+    /// coefficients are about 1. ∞ where every x is, which is what [`Outcome::Infeasible`] says; at least 1e10 otherwise.
     pub excluded_radius: f64,
+    /// Whether what is excluded are points with `F_b(x) ⪰ margin·I`, for the default margins of strict inequalities ([`BlockReport::margin`]),
+    /// and not all with `F_b(x) ≻ 0`. So only where the inequalities that contradict each other have no known part: then x, multiplied to the excluded
+    /// radius, has blocks less definite than the margin.
+    pub needs_margin: bool,
     /// Smallest eigenvalue over all `Z_b`, recomputed. Not negative beyond rounding.
     pub smallest_eigenvalue: f64,
 }
 
 /// A direction along which every inequality stays satisfied and the objective improves.
 ///
-/// `Σ dᵢ F_{b,i} ⪰ 0` for every block, while the objective changes by −1 (minimised) or +1 (maximised) per unit step.
+/// `Σ dᵢ F_{b,i} ⪰ 0` for every block, while the objective changes by −1 (minimised) or +1 (maximised) per unit step, up to rounding. Proved, the sign
+/// of the change too, in [`Outcome::Unbounded`].
 #[derive(Clone, Debug, Serialize)]
 pub struct Ray {
     /// The direction, one matrix per unknown in the order made.
@@ -122,13 +185,14 @@ pub struct Residuals {
 /// A proved bound on the optimum: weak duality with every rounding accounted for.
 ///
 /// No x that satisfies the inequalities (strict ones also with equality) has a smaller objective (a larger one when it is
-/// maximised), as long as no entry of an unknown is more than `reach` times as large as the largest one of that unknown in the answer. The
-/// restriction is what computed multipliers, which meet `A(Z) = c` to rounding only, can prove.
+/// maximised). Computed multipliers meet `A(Z) = c` to rounding only. That is made up for where the blocks bound the unknowns; where they
+/// do not, the bound speaks of those x of which no entry of an unknown is more than `reach` times as large as the largest one of that unknown
+/// in the answer.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct OptimumBound {
     /// The bound.
     pub value: f64,
-    /// How much larger than the answer x may be.
+    /// How much larger than the answer x may be; ∞ where the bound holds for every x.
     pub reach: f64,
 }
 
@@ -173,6 +237,8 @@ pub struct Answer {
     pub gap: f64,
     /// A proved bound on what any point can reach, of a solved problem.
     pub optimum_bound: Option<OptimumBound>,
+    /// Of a solved problem whose x is proved to be feasible: the objective there, rounded to the side on which a feasible point is proved to be as good.
+    pub attained: Option<f64>,
     /// Every inequality, in the order stated.
     pub blocks: Vec<BlockReport>,
     /// Coefficient ranges before and after balancing.

@@ -9,7 +9,7 @@
 //!
 //! with s_b the mean eigenvalue of F_b at the optimum, so that t is a share of what a block has.
 
-use crate::answer::{Answer, Outcome};
+use crate::answer::Answer;
 use crate::problem::{Inequality, Problem, Sense};
 use crate::{Error, Expr, Mat, Options};
 
@@ -35,7 +35,7 @@ impl Problem {
     /// The answer moved to the best-conditioned point whose objective is at most `room`·(1 + |p*|) from the optimum p*. The answer
     /// as it was where it is not solved, has no objective, or no better point is proved.
     pub(crate) fn best_conditioned(&self, answer: Answer, room: f64, options: &Options) -> Result<Answer, Error> {
-        let (Outcome::Solved, Some((sense, objective))) = (&answer.outcome, &self.objective) else {
+        let (true, Some((sense, objective))) = (answer.outcome.is_optimal(), &self.objective) else {
             return Ok(answer);
         };
         let mut relaxed = self.without_inequalities();
@@ -55,7 +55,7 @@ impl Problem {
         relaxed.positive_definite_by("share", one(1.0) - &t, 0.0);
         relaxed.maximize(&t);
         let mut second = relaxed.solve(&Options { back_off: None, bound: None, ..options.clone() })?;
-        let usable = matches!(second.outcome, Outcome::Solved) && second.objective > 0.0;
+        let usable = second.outcome.is_optimal() && second.objective > 0.0;
         if !usable {
             return Ok(answer);
         }

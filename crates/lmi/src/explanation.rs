@@ -60,7 +60,7 @@ impl fmt::Display for Explanation {
 }
 
 impl Problem {
-    /// Explains an answer that is [`Outcome::Infeasible`]; `None` for every other one, and where the least relaxation cannot be found.
+    /// Explains an answer that is [`Outcome::Infeasible`] or [`Outcome::InfeasibleWithin`]; `None` for every other one, and where the least relaxation cannot be found.
     ///
     /// Solves the problem anew with its inequalities relaxed, all together and then one by one.
     ///
@@ -104,7 +104,7 @@ type Relax<'a> = dyn Fn(&dyn Fn(usize) -> bool) -> Result<Answer, Error> + 'a;
 
 /// The explanation of an infeasible answer, from what solves for the least relaxation of some inequalities.
 pub(crate) fn explain(answer: &Answer, names: &[String], relax: &Relax<'_>) -> Result<Option<Explanation>, Error> {
-    if !matches!(answer.outcome, Outcome::Infeasible(_)) {
+    if !matches!(answer.outcome, Outcome::Infeasible(_) | Outcome::InfeasibleWithin(_)) {
         return Ok(None);
     }
     let least = |relaxed: &dyn Fn(usize) -> bool| -> Result<Option<Answer>, Error> {
@@ -112,7 +112,7 @@ pub(crate) fn explain(answer: &Answer, names: &[String], relax: &Relax<'_>) -> R
         let Residuals { primal, dual, gap, uncertainty } = answer.residuals;
         let near = primal.max(dual).max(gap).max(uncertainty) < 1e-4;
         let found = match answer.outcome {
-            Outcome::Solved => true,
+            Outcome::Solved | Outcome::SolvedToTolerance(_) => true,
             Outcome::Inaccurate(_) => near,
             _ => false,
         };

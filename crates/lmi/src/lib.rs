@@ -48,7 +48,8 @@
 //! # Outcomes
 //!
 //! Infeasible, unbounded and inaccurate are outcomes ([`Outcome`]), not errors: they carry a witness, a ray or the
-//! best point with its residuals. [`Error`] is for problems that have no meaning. The [`guide`] has a page on each.
+//! best point with its residuals. [`Outcome::Solved`], [`Outcome::Infeasible`] and [`Outcome::Unbounded`] are proved of the data as they were read,
+//! rounding included; what cannot be proved has a softer word. [`Error`] is for problems that have no meaning. The [`guide`] has a page on each.
 
 mod aligned;
 mod answer;
@@ -56,11 +57,13 @@ mod assembly;
 mod balancing;
 mod block;
 mod cholesky;
+mod coefficients;
 mod conditioning;
 mod dense;
 mod direction;
 mod double_double;
 mod error;
+mod estimate;
 mod explanation;
 mod expression;
 mod factored;
@@ -68,9 +71,11 @@ pub mod guide;
 mod interior_point;
 mod lanczos;
 mod lowering;
+mod multiplier;
 mod operators;
 mod options;
 mod problem;
+mod reach;
 mod report;
 mod rigorous;
 mod schur;
@@ -83,7 +88,8 @@ mod vectorized;
 mod verification;
 
 pub use answer::{
-    Answer, Balancing, BlockReport, InaccurateReason, IterationLog, OptimumBound, Outcome, Ray, Residuals, Witness,
+    Answer, Balancing, BlockReport, InaccurateReason, IterationLog, OptimumBound, Outcome, Ray, Residuals, Tolerance,
+    Witness,
 };
 pub use error::Error;
 pub use explanation::{Carrier, Explanation};

@@ -1,9 +1,10 @@
 //! Problems: unknowns, inequalities and an objective.
 
-use crate::answer::{Answer, BlockReport, InaccurateReason, OptimumBound, Outcome};
+use crate::answer::{Answer, BlockReport, InaccurateReason, OptimumBound, Outcome, Tolerance};
 use crate::expression::{Expr, Unknown};
 use crate::interior_point::Centre;
 use crate::lowering::{Layout, lower};
+use crate::multiplier::Multiplier;
 use crate::report::{Original, Translation, report, verify};
 use crate::rigorous::{Enclosure, Gradient, SumOfProducts};
 use crate::sdpa::{BlockShape, Coefficient, Sdp};
@@ -171,16 +172,16 @@ impl Problem {
         }
         let layout = Layout::new(&self.unknowns);
         let margins: Vec<f64> = self.inequalities.iter().map(|i| i.margin.unwrap_or(0.0)).collect();
-        Ok(verify(&Stated { problem: self, layout: &layout, margins: &margins, costs: &[] }, values).0)
+        Ok(verify(&Stated { problem: self, layout: &layout, margins: &margins }, values).0)
     }
 
     /// The answer with other values of the unknowns, where these are proved to satisfy the inequalities; otherwise as it was.
     pub(crate) fn moved(&self, answer: Answer, values: Vec<Mat<f64>>) -> Answer {
         let layout = Layout::new(&self.unknowns);
         let margins: Vec<f64> = answer.blocks.iter().map(|block| block.margin).collect();
-        let stated = Stated { problem: self, layout: &layout, margins: &margins, costs: &[] };
-        let (blocks, verified) = verify(&stated, &values);
-        if !verified {
+        let stated = Stated { problem: self, layout: &layout, margins: &margins };
+        let (blocks, proof) = verify(&stated, &values);
+        if !proof.proved {
             return answer;
         }
         let objective = stated.objective(&values);
@@ -191,7 +192,16 @@ impl Problem {
         let shrinks = answer.values.iter().zip(&values).map(|(x, y)| largest_entry(x) / largest_entry(y));
         let share = shrinks.fold(1.0, f64::min);
         let optimum_bound = answer.optimum_bound.map(|bound| OptimumBound { reach: share * bound.reach, ..bound });
-        Answer { blocks, objective, gap, optimum_bound, residuals, values, ..answer }
+        let (value, error) = stated.objective_enclosure(&values);
+        let sign = if matches!(self.objective, Some((Sense::Maximize, _))) { -1.0 } else { 1.0 };
+        let attained = Some(value + sign * (error + 2.0 * f64::EPSILON * value.abs()));
+        let outcome = match answer.outcome {
+            Outcome::SolvedToTolerance(tolerance) => {
+                Outcome::SolvedToTolerance(Tolerance { violation: 0.0, ..tolerance })
+            }
+            other => other,
+        };
+        Answer { outcome, blocks, objective, gap, optimum_bound, attained, residuals, values, ..answer }
     }
 
     /// With bounds on the unknowns, and the best-conditioned point after the optimum, where the options ask for them.
@@ -204,7 +214,7 @@ impl Problem {
             None => None,
         };
         let answer = match near {
-            Some(answer) if matches!(answer.outcome, Outcome::Solved) => answer,
+            Some(answer) if answer.outcome.is_optimal() => answer,
             _ => problem.solve_whole(options)?,
         };
         match options.back_off {
@@ -219,7 +229,7 @@ impl Problem {
         if unproved && options.margin > 0.0 {
             // The default margin may have been too much for a set that is thin: F(x) ≻ 0 is proved or not, whatever was imposed.
             let again = self.solve_once(None, &Options { margin: 0.0, ..options.clone() })?;
-            if matches!(again.outcome, Outcome::Solved) {
+            if again.outcome.is_optimal() {
                 return Ok(again);
             }
         }
@@ -229,7 +239,6 @@ impl Problem {
     fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {
         let mut lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
         lowered.program.warm = centre.filter(|centre| centre.fits(&lowered.program)).cloned();
-        let costs = lowered.program.objective.clone();
         let (result, balancing) = balancing::solve(lowered.program, &lowered.margins, options);
         let translation = Translation {
             layout: &lowered.layout,
@@ -238,7 +247,7 @@ impl Problem {
             sign: lowered.sign,
         };
         Ok(report(
-            &Stated { problem: self, layout: &lowered.layout, margins: &lowered.margins, costs: &costs },
+            &Stated { problem: self, layout: &lowered.layout, margins: &lowered.margins },
             &translation,
             result,
             balancing,
@@ -265,7 +274,6 @@ struct Stated<'a> {
     problem: &'a Problem,
     layout: &'a Layout,
     margins: &'a [f64],
-    costs: &'a [f64],
 }
 
 impl Original for Stated<'_> {
@@ -299,28 +307,59 @@ impl Original for Stated<'_> {
         objective.map_or(0.0, |(_, expression)| expression.evaluate(&|unknown| &values[unknown.index])[(0, 0)])
     }
 
-    fn costs(&self) -> &[f64] {
-        self.costs
+    fn objective_enclosure(&self, values: &[Mat<f64>]) -> (f64, f64) {
+        let objective = self.problem.objective.as_ref();
+        let enclosure =
+            |(_, e): &(Sense, Expr)| Enclosure::of_expression(e, &|unknown| &values[unknown.index]).scalar();
+        objective.map_or((0.0, 0.0), enclosure)
     }
 
-    fn gradient_bounds(&self, multipliers: &[Mat<f64>], offset: Option<&[f64]>) -> Vec<f64> {
+    fn slope(&self, direction: &[Mat<f64>]) -> (f64, f64) {
+        let objective = self.problem.objective.as_ref();
+        let change = |(_, e): &(Sense, Expr)| Enclosure::of_change(e, &|unknown| &direction[unknown.index]).scalar();
+        objective.map_or((0.0, 0.0), change)
+    }
+
+    fn has_objective(&self) -> bool {
+        self.problem.objective.as_ref().is_some_and(|(_, objective)| !objective.terms.is_empty())
+    }
+
+    fn change(&self, block: usize, direction: &[Mat<f64>]) -> Enclosure {
+        Enclosure::of_change(&self.problem.inequalities[block].expression, &|unknown| &direction[unknown.index])
+    }
+
+    fn is_diagonal(&self, _: usize) -> bool {
+        false
+    }
+
+    fn is_homogeneous(&self, block: usize) -> bool {
+        let Inequality { expression, margin, .. } = &self.problem.inequalities[block];
+        margin.is_none_or(|margin| margin == 0.0) && largest_entry(&expression.constant) == 0.0
+    }
+
+    fn entries(&self, block: usize, sink: &mut dyn FnMut(usize, usize, Option<usize>, f64)) {
+        self.problem.inequalities[block].expression.coefficients(self.layout, sink);
+    }
+
+    fn gradient_bounds(&self, multipliers: &[Multiplier], with_objective: bool) -> Vec<f64> {
         let expressions = self.problem.inequalities.iter().map(|inequality| &inequality.expression);
-        let gradient = Gradient::new(&self.problem.unknowns, expressions.zip(multipliers));
+        // A(Z) − c: the objective is one more block, with a multiplier of −1 when it is minimised.
+        let sense = |sense: Sense| Mat::from_fn(1, 1, |_, _| if sense == Sense::Minimize { -1.0 } else { 1.0 });
+        let objective = self.problem.objective.as_ref().filter(|_| with_objective);
+        let objective = objective.map(|(direction, expression)| (expression, sense(*direction)));
+        let blocks = expressions.zip(multipliers.iter().map(|z| &z.matrix));
+        let all = blocks.chain(objective.as_ref().map(|(expression, sign)| (*expression, sign)));
+        let gradient = Gradient::new(&self.problem.unknowns, all);
         let values = self.layout.scalars(&gradient.values);
         let radii = self.layout.scalars(&gradient.radii);
-        let bound = |(i, (value, radius)): (usize, (&f64, f64))| {
-            let offset = offset.map_or(0.0, |offset| offset[i]);
-            // The offset is a sum of two weights at most.
-            1.001 * ((value - offset).abs() + radius + 4.0 * f64::EPSILON * offset.abs())
-        };
-        values.iter().zip(radii).enumerate().map(bound).collect()
+        values.iter().zip(radii).map(|(value, radius)| 1.001 * (value.abs() + radius)).collect()
     }
 
     fn strict(&self, block: usize) -> bool {
         self.problem.inequalities[block].margin.is_none()
     }
 
-    fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {
-        self.problem.inequalities[block].margin.map(|margin| margin - 4.0 * spectrum.rounding)
+    fn tolerance(&self, block: usize, spectrum: &Spectrum) -> f64 {
+        if self.strict(block) { 0.0 } else { 4.0 * spectrum.rounding }
     }
 }

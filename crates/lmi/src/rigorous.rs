@@ -55,7 +55,15 @@ impl Enclosure {
 
     /// Of a symmetric expression at the unknowns given, its symmetric part.
     pub fn of_expression<'a>(expression: &Expr, value_of: &dyn Fn(Unknown) -> &'a Mat<f64>) -> Self {
-        let mut sum = Self::of_entries(&expression.constant);
+        Self::of_terms(Self::of_entries(&expression.constant), expression, value_of)
+    }
+
+    /// Of the expression without its known part.
+    pub fn of_change<'a>(expression: &Expr, value_of: &dyn Fn(Unknown) -> &'a Mat<f64>) -> Self {
+        Self::of_terms(Self::zeros(expression.nrows(), false), expression, value_of)
+    }
+
+    fn of_terms<'a>(mut sum: Self, expression: &Expr, value_of: &dyn Fn(Unknown) -> &'a Mat<f64>) -> Self {
         for term in expression.terms.iter() {
             sum.add_term(&term.shape, value_of(term.unknown));
         }
@@ -129,6 +137,25 @@ impl Enclosure {
         self.roundings += 1.0;
     }
 
+    /// The one entry of a 1 × 1 matrix, rounded, with a bound on its error.
+    pub fn scalar(&self) -> (f64, f64) {
+        let value = self.high[0] + self.low[0];
+        (value, 1.001 * self.radius(0) + 2.0 * f64::EPSILON * value.abs())
+    }
+
+    /// The rows and columns given.
+    pub fn part(&self, rows: &[usize]) -> Self {
+        let n = self.n;
+        let pick = |of: &[f64]| -> Vec<f64> {
+            if self.diagonal {
+                return rows.iter().map(|&i| of[i]).collect();
+            }
+            rows.iter().flat_map(|&j| rows.iter().map(move |&i| of[i + j * n])).collect()
+        };
+        let [high, low, magnitude] = [&self.high, &self.low, &self.magnitude].map(|of| pick(of));
+        Self { n: rows.len(), high, low, magnitude, ..*self }
+    }
+
     /// The entries as they were computed, of a diagonal matrix its diagonal as a column.
     pub fn approximate(&self) -> Mat<f64> {
         let columns = if self.diagonal { 1 } else { self.n };
@@ -154,13 +181,7 @@ impl Enclosure {
             return f64::INFINITY;
         }
         if self.diagonal {
-            let entry = |at: usize| {
-                let (value, radius) = (self.high[at] + self.low[at], self.radius(at));
-                value - radius - 4.0 * f64::EPSILON * (value.abs() + radius)
-            };
-            let smallest =
-                (0..self.n).map(entry).fold(f64::INFINITY, |m, e| if e.is_nan() { f64::NAN } else { m.min(e) });
-            return if smallest.is_nan() { f64::NEG_INFINITY } else { smallest };
+            return self.smallest_entry();
         }
         let Spectrum { smallest, rounding, .. } = *estimate;
         if !(smallest.is_finite() && rounding.is_finite()) {
@@ -196,7 +217,17 @@ impl Enclosure {
 
     /// Whether the matrix minus `shift`·I is proved to be positive definite.
     pub fn exceeds(&self, shift: f64) -> bool {
-        self.factor(shift).is_some()
+        if self.diagonal { self.smallest_entry() > shift } else { self.factor(shift).is_some() }
+    }
+
+    /// A lower bound on the entries of a diagonal matrix, −∞ where there is none.
+    fn smallest_entry(&self) -> f64 {
+        let entry = |at: usize| {
+            let (value, radius) = (self.high[at] + self.low[at], self.radius(at));
+            value - radius - 4.0 * f64::EPSILON * (value.abs() + radius)
+        };
+        let smallest = (0..self.n).map(entry).fold(f64::INFINITY, |m, e| if e.is_nan() { f64::NAN } else { m.min(e) });
+        if smallest.is_nan() { f64::NEG_INFINITY } else { smallest }
     }
 
     /// The factor that proves the matrix minus `shift`·I to be positive definite; `None` where it is not proved.

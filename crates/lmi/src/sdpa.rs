@@ -30,6 +30,7 @@ use crate::explanation::explain;
 use crate::expression::Unknown;
 use crate::factored::Factored;
 use crate::lowering::{Layout, check_size};
+use crate::multiplier::Multiplier;
 use crate::report::{Original, Translation, report, verify};
 use crate::rigorous::{Enclosure, SumOfProducts};
 use crate::sparse::{Entry, Sparse, merge};
@@ -292,13 +293,7 @@ impl Original for Stated<'_> {
     }
 
     fn enclosure(&self, block: usize, values: &[Mat<f64>]) -> Enclosure {
-        let shape = self.sdp.blocks[block];
-        let mut sum = Enclosure::zeros(shape.size(), matches!(shape, BlockShape::Diagonal(_)));
-        sum.add_products(self.sdp.coefficients.iter().filter(|c| c.block == block).flat_map(|c| {
-            let x = c.unknown.map_or(-1.0, |unknown| values[0][(unknown, 0)]);
-            c.places().map(move |(row, column)| (row, column, c.value, x))
-        }));
-        sum
+        self.enclose(block, |unknown| Some(unknown.map_or(-1.0, |unknown| values[0][(unknown, 0)])))
     }
 
     fn known_product(&self, block: usize, z: &Mat<f64>) -> SumOfProducts {
@@ -310,18 +305,47 @@ impl Original for Stated<'_> {
         self.sdp.objective.iter().enumerate().map(|(i, c)| c * values[0][(i, 0)]).sum()
     }
 
-    fn costs(&self) -> &[f64] {
-        &self.sdp.objective
+    fn objective_enclosure(&self, values: &[Mat<f64>]) -> (f64, f64) {
+        let sum = SumOfProducts::of(self.sdp.objective.iter().enumerate().map(|(i, c)| (*c, values[0][(i, 0)])));
+        (sum.value(), sum.error())
     }
 
-    fn gradient_bounds(&self, multipliers: &[Mat<f64>], offset: Option<&[f64]>) -> Vec<f64> {
+    fn slope(&self, direction: &[Mat<f64>]) -> (f64, f64) {
+        self.objective_enclosure(direction)
+    }
+
+    fn has_objective(&self) -> bool {
+        self.sdp.objective.iter().any(|c| *c != 0.0)
+    }
+
+    fn change(&self, block: usize, direction: &[Mat<f64>]) -> Enclosure {
+        self.enclose(block, |unknown| unknown.map(|unknown| direction[0][(unknown, 0)]))
+    }
+
+    fn is_diagonal(&self, block: usize) -> bool {
+        matches!(self.sdp.blocks[block], BlockShape::Diagonal(_))
+    }
+
+    fn is_homogeneous(&self, block: usize) -> bool {
+        !self.sdp.coefficients.iter().any(|c| c.block == block && c.unknown.is_none() && c.value != 0.0)
+    }
+
+    fn entries(&self, block: usize, sink: &mut dyn FnMut(usize, usize, Option<usize>, f64)) {
+        for c in self.sdp.coefficients.iter().filter(|c| c.block == block && c.value != 0.0) {
+            let value = if c.unknown.is_none() { -c.value } else { c.value };
+            sink(c.row.max(c.column), c.row.min(c.column), c.unknown, value);
+        }
+    }
+
+    fn gradient_bounds(&self, multipliers: &[Multiplier], with_objective: bool) -> Vec<f64> {
         let mut gradient = Enclosure::zeros(self.sdp.objective.len(), true);
-        let offsets = offset.unwrap_or_default().iter().enumerate().map(|(k, offset)| (k, k, -1.0, *offset));
+        let objective = self.sdp.objective.iter().enumerate().filter(|_| with_objective);
+        let objective = objective.map(|(k, cost)| (k, k, -1.0, *cost));
         let products = self.sdp.coefficients.iter().filter_map(|c| {
             let (k, count) = (c.unknown?, if c.row == c.column { 1.0 } else { 2.0 });
-            Some((k, k, count * c.value, multipliers[c.block][(c.row, c.column)]))
+            Some((k, k, count * c.value, multipliers[c.block].matrix[(c.row, c.column)]))
         });
-        gradient.add_products(offsets.chain(products));
+        gradient.add_products(objective.chain(products));
         gradient.absolute_bounds()
     }
 
@@ -329,9 +353,22 @@ impl Original for Stated<'_> {
         false
     }
 
-    fn floor(&self, block: usize, spectrum: &Spectrum) -> Option<f64> {
+    fn tolerance(&self, block: usize, spectrum: &Spectrum) -> f64 {
         let constant = self.sdp.coefficients.iter().filter(|c| c.block == block && c.unknown.is_none());
         let square: f64 = constant.map(|c| c.value * c.value * if c.row == c.column { 1.0 } else { 2.0 }).sum();
-        Some(-self.options.feasibility_tolerance * (1.0 + square.sqrt()) - spectrum.rounding)
+        self.options.feasibility_tolerance * (1.0 + square.sqrt()) + spectrum.rounding
+    }
+}
+
+impl Stated<'_> {
+    /// Σ of coefficients times the factors of their unknowns, those without a factor left out.
+    fn enclose(&self, block: usize, factor: impl Fn(Option<usize>) -> Option<f64>) -> Enclosure {
+        let shape = self.sdp.blocks[block];
+        let mut sum = Enclosure::zeros(shape.size(), matches!(shape, BlockShape::Diagonal(_)));
+        sum.add_products(self.sdp.coefficients.iter().filter(|c| c.block == block).flat_map(|c| {
+            let x = factor(c.unknown);
+            c.places().filter_map(move |(row, column)| Some((row, column, c.value, x?)))
+        }));
+        sum
     }
 }

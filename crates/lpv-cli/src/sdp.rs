@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use crate::output::print;
 use clap::Args;
 use lmi::{Answer, Explanation, Options, Outcome, sdpa};
+use lpv::math::decimal::{Rounding, about, at_least, at_most, decimal};
 use serde::Serialize;
 use std::fs::File;
 use std::io::BufReader;
@@ -28,8 +29,12 @@ struct SdpRecord {
     /// cᵀx
     objective: f64,
     dual_objective: f64,
-    /// Proved: no x whose entries are at most ten times as large as this one's does better.
+    /// Proved: no x does better whose entries are at most `bound_reach` times as large as this one's.
     optimum_bound: Option<f64>,
+    /// Null where the bound holds for every x.
+    bound_reach: Option<f64>,
+    /// Proved: a feasible x, this one, is as good.
+    attained: Option<f64>,
     /// The point that all of this is about.
     x: Vec<f64>,
     gap: f64,
@@ -47,7 +52,7 @@ struct SdpRecord {
     explanation: Option<Explanation>,
 }
 
-/// Solve the problem; every outcome but `solved` is a failure.
+/// Solve the problem; every outcome but `solved` is a failure: an optimum that is proved not to exist one kind, what is not proved the other.
 pub fn run(arguments: &SdpArguments) -> Result<(), Failure> {
     let unreadable = |message: String| Failure::Unreadable { file: arguments.file.clone(), message };
     let file = File::open(&arguments.file).map_err(|error| unreadable(format!("cannot be read: {error}")))?;
@@ -68,37 +73,60 @@ pub fn run(arguments: &SdpArguments) -> Result<(), Failure> {
         Outcome::Infeasible(_) | Outcome::Unbounded(_) => {
             Err(Failure::NoOptimum(format!("{}: {}: {}", arguments.file.display(), record.status, record.detail)))
         }
-        Outcome::Inaccurate(_) => {
+        Outcome::SolvedToTolerance(_)
+        | Outcome::InfeasibleWithin(_)
+        | Outcome::UnboundedToTolerance(_)
+        | Outcome::Inaccurate(_) => {
             Err(Failure::NotCertified(format!("{}: {}", arguments.file.display(), record.detail)))
         }
     }
 }
 
+/// What the outcome says, with its numbers on the safe side.
+fn detail(outcome: &Outcome) -> String {
+    match outcome {
+        Outcome::Solved => String::new(),
+        Outcome::SolvedToTolerance(tolerance) if tolerance.violation == 0.0 => format!(
+            "the point is proved to be feasible; that it is optimal is proved to {}, relative",
+            at_most(tolerance.gap)
+        ),
+        Outcome::SolvedToTolerance(tolerance) => format!(
+            "the point violates its inequalities by at most {}; whether there is a feasible one is not proved",
+            at_most(tolerance.violation)
+        ),
+        Outcome::Infeasible(witness) => format!(
+            "multipliers Z ⪰ 0 prove that no x satisfies the inequalities; they leave a residual of at most {}",
+            at_most(witness.residual)
+        ),
+        Outcome::InfeasibleWithin(witness) => format!(
+            "multipliers Z ⪰ 0 prove that no x with entries up to {} units of the balanced problem satisfies the inequalities; larger ones \
+             are not excluded, because the multipliers leave a residual of up to {}",
+            at_least(witness.excluded_radius),
+            at_most(witness.residual)
+        ),
+        Outcome::Unbounded(ray) => format!(
+            "x is proved to be feasible, and the objective to fall without end along a ray from it, whose blocks have a least eigenvalue of about {}",
+            about(ray.smallest_eigenvalue)
+        ),
+        Outcome::UnboundedToTolerance(ray) => format!(
+            "the objective falls along a ray, as far as rounding lets see: its blocks have a least eigenvalue of about {}; that it falls \
+             without end from a feasible point is not proved",
+            about(ray.smallest_eigenvalue)
+        ),
+        Outcome::Inaccurate(reason) => format!("the solver stopped short: {reason}"),
+    }
+}
+
 fn record(answer: &Answer, seconds: f64, explanation: Option<Explanation>) -> SdpRecord {
-    let (status, detail) = match &answer.outcome {
-        Outcome::Solved => ("solved", String::new()),
-        Outcome::Infeasible(witness) => (
-            "infeasible",
-            format!(
-                "multipliers Z ⪰ 0 show that no x satisfies the inequalities; they leave a residual of {:.1e}, least eigenvalue {:.1e}",
-                witness.residual, witness.smallest_eigenvalue
-            ),
-        ),
-        Outcome::Unbounded(ray) => (
-            "unbounded",
-            format!(
-                "the objective falls without end along a ray, whose blocks have a relative least eigenvalue of {:.1e}",
-                ray.smallest_eigenvalue
-            ),
-        ),
-        Outcome::Inaccurate(reason) => ("inaccurate", format!("the solver stopped short: {reason}")),
-    };
+    let (status, detail) = (answer.outcome.word(), detail(&answer.outcome));
     SdpRecord {
         status,
         detail,
         objective: answer.objective,
         dual_objective: answer.dual_objective,
         optimum_bound: answer.optimum_bound.map(|bound| bound.value),
+        bound_reach: answer.optimum_bound.map(|bound| bound.reach).filter(|reach| reach.is_finite()),
+        attained: answer.attained,
         x: answer.unknown_values().iter().flat_map(|x| (0..x.nrows()).map(|i| x[(i, 0)])).collect(),
         gap: answer.gap,
         primal_residual: answer.residuals.primal,
@@ -114,13 +142,20 @@ fn record(answer: &Answer, seconds: f64, explanation: Option<Explanation>) -> Sd
 
 fn text(record: &SdpRecord) -> String {
     let least = record.verified_lower_bounds.iter().copied().enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-    let margin = least.map_or(String::new(), |(block, value)| format!("{value:.3e} in block {}", block + 1));
+    let margin = least.map_or(String::new(), |(block, value)| format!("{} in block {}", at_least(value), block + 1));
+    let bound = |bound: f64| {
+        let reach = record.bound_reach.map_or(String::new(), |reach| {
+            format!("  (for x with entries up to {} times those found)", at_least(reach))
+        });
+        format!("{}{reach}", decimal(bound, 10, Rounding::Down))
+    };
     let rows = [
         ("status", record.status.to_owned()),
         ("detail", record.detail.clone()),
         ("objective", format!("{:.9e}", record.objective)),
         ("dual objective", format!("{:.9e}", record.dual_objective)),
-        ("optimum proved ≥", record.optimum_bound.map_or(String::new(), |bound| format!("{bound:.9e}"))),
+        ("optimum proved ≥", record.optimum_bound.map_or(String::new(), bound)),
+        ("and proved ≤", record.attained.map_or(String::new(), |value| decimal(value, 10, Rounding::Up))),
         ("gap", format!("{:.2e}", record.gap)),
         ("residuals", format!("{:.1e} primal, {:.1e} dual", record.primal_residual, record.dual_residual)),
         ("λ_min proved ≥", margin),

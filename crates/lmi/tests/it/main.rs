@@ -11,3 +11,4 @@ mod scaling;
 mod sdpa_format;
 mod sdplib;
 mod stages;
+mod truth;

@@ -127,7 +127,7 @@ proptest! {
                     prop_assert!(bound <= optimum + 1e-13 * (1.0 + optimum.abs()), "{bound:e} {optimum:e}");
                     prop_assert!(bound >= optimum - 1e-4 * (1.0 + optimum.abs()), "{bound:e} {optimum:e}");
                 }
-                Outcome::Inaccurate(_) => prop_assert!((answer.objective - optimum).abs() < 1e-3 * (1.0 + optimum.abs())),
+                Outcome::SolvedToTolerance(_) | Outcome::Inaccurate(_) => prop_assert!((answer.objective - optimum).abs() < 1e-3 * (1.0 + optimum.abs())),
                 other => prop_assert!(false, "{other:?}"),
             }
         }
@@ -153,7 +153,8 @@ proptest! {
         };
         let instance = Instance { c: (0..m).map(|_| numbers.next()).collect(), constants: vec![constant], coefficients: vec![f] };
         for answer in instance.outcomes() {
-            let Outcome::Infeasible(witness) = &answer.outcome else {
+            // From as many matrices as there are entries something far out may satisfy the rounded data.
+            let (Outcome::Infeasible(witness) | Outcome::InfeasibleWithin(witness)) = &answer.outcome else {
                 return Err(TestCaseError::fail(format!("{:?} {:?}", answer.outcome, answer.residuals)));
             };
             let z = &witness.multipliers[0];
@@ -175,7 +176,10 @@ proptest! {
         c[0] = -0.5 - c[0].abs();
         let instance = Instance { c, constants: vec![numbers.symmetric(n)], coefficients: vec![f] };
         for answer in instance.outcomes() {
-            prop_assert!(matches!(answer.outcome, Outcome::Unbounded(_)), "{:?}", answer.outcome);
+            prop_assert!(
+                matches!(answer.outcome, Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_)),
+                "{:?}", answer.outcome
+            );
         }
     }
 
@@ -242,7 +246,7 @@ fn multipliers_without_interior() {
         let reduced = bound(&laplacian, |_, f| complement.transpose().to_owned() * f * &complement);
         assert!(matches!(reduced.outcome, Outcome::Solved), "{seed}: {:?}", reduced.outcome);
         assert!(
-            !matches!(whole.outcome, Outcome::Infeasible(_) | Outcome::Unbounded(_)),
+            whole.outcome.is_optimal() || matches!(whole.outcome, Outcome::Inaccurate(_)),
             "{seed}: {:?}",
             whole.outcome
         );

@@ -247,8 +247,8 @@ fn report(
     seconds: f64,
 ) -> Report {
     let severity = |design: &PolytopicDesign| match status(design) {
-        "infeasible" => 3,
-        "unbounded" => 2,
+        "infeasible" | "infeasible within a radius" => 3,
+        "unbounded" | "unbounded to tolerance" => 2,
         "inaccurate" => 1,
         _ => 0,
     };
@@ -336,14 +336,13 @@ fn largest_singular_value(k: &Mat<f64>) -> f64 {
 }
 
 fn status(design: &PolytopicDesign) -> &'static str {
-    match design.answer.outcome {
+    let outcome = &design.answer.outcome;
+    match outcome {
         _ if design.is_infeasible() => "infeasible",
         _ if design.is_solved() => SOLVED,
         _ if design.undetectable.is_some() => "unbounded",
-        Outcome::Solved => "inaccurate",
-        Outcome::Infeasible(_) => "infeasible",
-        Outcome::Unbounded(_) => "unbounded",
-        Outcome::Inaccurate(_) => "inaccurate",
+        _ if outcome.is_optimal() => "inaccurate",
+        _ => outcome.word(),
     }
 }
 
@@ -394,7 +393,11 @@ fn witness(design: &PolytopicDesign) -> Option<Vec<NamedMultiplier>> {
         };
         return Some(separation.multipliers.iter().zip(0..).map(named).collect());
     }
-    let Outcome::Infeasible(Witness { multipliers, .. }) = &answer.outcome else { return None };
+    let (Outcome::Infeasible(Witness { multipliers, .. }) | Outcome::InfeasibleWithin(Witness { multipliers, .. })) =
+        &answer.outcome
+    else {
+        return None;
+    };
     let named = |(z, block): (&Mat<f64>, &lmi::BlockReport)| NamedMultiplier {
         name: block.name.clone(),
         multiplier: to_rows(z),

@@ -84,19 +84,25 @@ pub(super) fn verdict(plan: &ProblemPlan, design: &PolytopicDesign, inside: Opti
         _ if solved => {
             (Verdict::Numerical, "verified for Y and L at all vertices, for every motion of the parameter in the polytope".into())
         }
-        (Outcome::Solved, _, _) => (Verdict::Undecided, "Y is singular".into()),
+        (Outcome::Solved | Outcome::SolvedToTolerance(_), _, _) => {
+            (Verdict::Undecided, "the point that was found misses an inequality by a rounding error".into())
+        }
         (Outcome::Inaccurate(reason), _, _) => {
-            let seems = design.unstabilizable.as_ref().map_or(String::new(), |point| format!("; as far as rounding tells, {}", unstabilizable(plan, point)));
+            let seems = (design.unstabilizable.as_ref())
+                .map_or(String::new(), |point| format!("; as far as rounding tells, {}", unstabilizable(plan, point)));
             (Verdict::Undecided, format!("the solver stopped short: {reason}{seems}"))
         }
-        (Outcome::Infeasible(witness), _, _) => (
+        (Outcome::Infeasible(_), _, _) => {
+            (Verdict::Refuted, "no solution exists: the witness contradicts the inequalities".into())
+        }
+        (Outcome::InfeasibleWithin(witness), _, _) => (
             Verdict::Undecided,
             format!(
-                "no solution exists with unknowns up to {} in the units of the balanced problem: the witness contradicts the inequalities",
+                "no solution was found, and none exists with entries up to {} times the problem's units",
                 at_least(witness.excluded_radius)
             ),
         ),
-        (Outcome::Unbounded(_), _, _) => {
+        (Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_), _, _) => {
             (Verdict::Undecided, "the objective grows without end, as far as the solver sees: some state costs too little; give it a larger weight in Q".into())
         }
     }

@@ -64,12 +64,12 @@ pub(super) fn unsaturated(y: &Expr, row: Expr, sigma: f64, gamma: f64) -> Expr {
 /// Relative gap to aim for: the back-off of P makes up for what is left.
 const GAP: f64 = 1e-9;
 
-/// Solve, and turn every outcome but `Solved` into an error that says where.
+/// Solve, and turn every outcome without a point that is proved to be feasible into an error that says where.
 pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisError> {
     let answer = problem.solve(&Options { gap_tolerance: GAP, ..Options::default() })?;
     match &answer.outcome {
-        Outcome::Solved => Ok(answer),
-        Outcome::Infeasible(witness) => {
+        outcome if outcome.is_feasible() => Ok(answer),
+        Outcome::Infeasible(witness) | Outcome::InfeasibleWithin(witness) => {
             let weight = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
             let total: f64 = witness.multipliers.iter().map(weight).sum();
             let mut shares: Vec<(f64, &str)> = (witness.multipliers.iter().zip(&answer.blocks))
@@ -80,7 +80,11 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
                 shares.iter().take(3).map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
             Err(SynthesisError::Infeasible { rho, radius: witness.excluded_radius, carriers })
         }
-        Outcome::Unbounded(_) => Err(SynthesisError::Unbounded { rho }),
+        Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_) => Err(SynthesisError::Unbounded { rho }),
         Outcome::Inaccurate(reason) => Err(SynthesisError::Inaccurate { rho, reason: reason.to_string() }),
+        Outcome::Solved | Outcome::SolvedToTolerance(_) => {
+            let reason = "the point it found misses an inequality by a rounding error".into();
+            Err(SynthesisError::Inaccurate { rho, reason })
+        }
     }
 }

@@ -118,7 +118,7 @@ impl PolytopicDesign {
     /// Whether Y and L satisfy every inequality, with a proved margin: at the optimum, or with a part of it given back.
     pub fn is_solved(&self) -> bool {
         let is_proved = self.moderation.is_some() || self.riccati.is_some();
-        self.solution.is_some() && (is_proved || matches!(self.answer.outcome, Outcome::Solved))
+        self.solution.is_some() && (is_proved || self.answer.outcome.is_feasible())
     }
 
     /// The optimum of what was asked for, whatever was given back of it.
@@ -153,7 +153,7 @@ impl PolytopicDesign {
 
     /// A witness of the solver excludes solutions up to a size. Of one vertex that is stabilisable it is known that there are larger ones.
     fn withdraw_infeasible(&mut self, polytope: &Polytope) {
-        if matches!(self.answer.outcome, Outcome::Infeasible(_))
+        if matches!(self.answer.outcome, Outcome::InfeasibleWithin(_))
             && polytope.len() == 1
             && stabilizability(polytope.a(0), polytope.b(0)) == Stabilizability::Stabilizable
         {
@@ -242,7 +242,7 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     problem.maximize(&t);
     let terms = sum.stability_terms();
     let answer = problem.solve(&solver())?;
-    let solved = matches!(answer.outcome, Outcome::Solved);
+    let solved = answer.outcome.is_optimal();
     let moderated = |answer: Answer| -> Result<PolytopicDesign, SynthesisError> {
         let identity = Mat::identity(polytope.inputs(), polytope.inputs());
         let stage = Stage {
@@ -377,7 +377,8 @@ fn regulate(
     let objective = request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
     let answer = problem.solve(&solver())?;
     let mut seems_unstabilizable = None;
-    if matches!(answer.outcome, Outcome::Inaccurate(_) | Outcome::Infeasible(_)) {
+    let contradicts = matches!(answer.outcome, Outcome::Infeasible(_) | Outcome::InfeasibleWithin(_));
+    if contradicts || matches!(answer.outcome, Outcome::Inaccurate(_)) {
         let stabilization = stabilize(polytope, request)?;
         if stabilization.is_infeasible() {
             return Ok(stabilization);
@@ -387,7 +388,7 @@ fn regulate(
     let is_riccati =
         polytope.len() == 1 && request.saturation.is_none() && matches!(request.objective, Objective::Trace);
     let mut undetectable = None;
-    if is_riccati && !matches!(answer.outcome, Outcome::Solved) {
+    if is_riccati && !answer.outcome.is_feasible() {
         match riccati::solve(polytope.a(0), polytope.b(0), &cost.q, &cost.r) {
             Ok(regulator) => {
                 if let Some(design) = by_riccati(polytope, cost, &problem, &answer, &regulator)? {
@@ -410,7 +411,7 @@ fn regulate(
         ladder: &COST_LADDER,
     };
     // the optimum of one vertex without limits is the Riccati solution, which is attained
-    let is_attained = is_riccati && matches!(answer.outcome, Outcome::Solved);
+    let is_attained = is_riccati && answer.outcome.is_feasible();
     let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
     let moderated = stage.moderate(answer, back_off, &solver())?;
     let shrink = moderated.shrink;
@@ -549,7 +550,7 @@ fn finish(
     let Moderated { answer, shrink, moderation } = moderated;
     let explanation = problem.explain(&answer, &solver())?;
     let solution = match answer.outcome {
-        Outcome::Solved | Outcome::Inaccurate(_) => {
+        Outcome::Solved | Outcome::SolvedToTolerance(_) | Outcome::Inaccurate(_) => {
             let values = |of: &[Expr]| -> Vec<Mat<f64>> {
                 of.iter().map(|expression| scaled(&answer.value(expression), 1.0 / shrink)).collect()
             };
@@ -566,7 +567,10 @@ fn finish(
                 p,
             })
         }
-        Outcome::Infeasible(_) | Outcome::Unbounded(_) => None,
+        Outcome::Infeasible(_)
+        | Outcome::InfeasibleWithin(_)
+        | Outcome::Unbounded(_)
+        | Outcome::UnboundedToTolerance(_) => None,
     };
     Ok(PolytopicDesign { moderation, explanation, solution, ..PolytopicDesign::without_solution(answer) })
 }

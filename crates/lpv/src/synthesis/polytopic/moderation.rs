@@ -101,7 +101,7 @@ pub(super) struct Moderated {
 
 /// Whether every inequality is proved at the point of an answer. That its own objective is not at its optimum is no harm.
 fn is_feasible(answer: &Answer) -> bool {
-    let has_point = matches!(answer.outcome, Outcome::Solved | Outcome::Inaccurate(_));
+    let has_point = answer.outcome.is_optimal() || matches!(answer.outcome, Outcome::Inaccurate(_));
     has_point && answer.blocks.iter().all(|block| block.verified_lower_bound > 0.0)
 }
 
@@ -118,7 +118,7 @@ impl Stage<'_> {
     /// # Errors
     /// Problems without meaning.
     pub fn moderate(&self, answer: Answer, back_off: BackOff, options: &Options) -> Result<Moderated, Error> {
-        let is_attained = matches!(answer.outcome, Outcome::Solved);
+        let is_attained = answer.outcome.is_optimal();
         let is_a_start = is_attained || matches!(answer.outcome, Outcome::Inaccurate(_));
         let optimum = answer.value(&self.objective.value)[(0, 0)];
         if back_off == BackOff::Nothing || !is_a_start || !optimum.is_finite() || optimum <= self.least {

@@ -116,6 +116,6 @@ fn search(polytope: &Polytope) -> Option<Vec<Mat<f64>>> {
     problem.positive_definite_by("scale", Expr::identity(1) - total, 0.0);
     problem.maximize(&s);
     let answer = problem.solve(&lmi::Options { gap_tolerance: 1e-8, ..solver() }).ok()?;
-    let has_point = matches!(answer.outcome, Outcome::Solved | Outcome::Inaccurate(_));
+    let has_point = answer.outcome.is_optimal() || matches!(answer.outcome, Outcome::Inaccurate(_));
     has_point.then(|| w.iter().map(|w| &n * answer.value(w) * n.transpose()).collect())
 }
