@@ -34,6 +34,7 @@ use crate::math::eigen::smallest_eigenvalue;
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
 use crate::math::riccati::{self, Regulator, RiccatiError};
 use crate::math::stabilizability::{Mode, Stabilizability, stabilizability};
+use crate::math::unmoved::sum_is_zero;
 use crate::model::{FrozenModel, Polytope};
 use inequality::{DoubleSum, Unknowns, Weights};
 use lmi::{Answer, BlockReport, Carrier, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
@@ -226,12 +227,12 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     Ok(design)
 }
 
-/// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean tells.
+/// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean, taken exactly, tells.
 fn rests(lyapunov: &Lyapunov) -> bool {
     let Lyapunov::ParameterDependent { rate_vertices } = lyapunov else { return true };
-    let mean = |i: usize| rate_vertices.iter().map(|nu| nu[i]).sum::<f64>();
+    let rates = |i: usize| rate_vertices.iter().map(|nu| nu[i]).collect::<Vec<f64>>();
     rate_vertices.iter().any(|nu| nu.iter().all(|&rate| rate == 0.0))
-        || rate_vertices.first().is_some_and(|first| (0..first.len()).all(|i| mean(i) == 0.0))
+        || rate_vertices.first().is_some_and(|first| (0..first.len()).all(|i| sum_is_zero(&rates(i))))
 }
 
 /// The stability inequalities of the vertices that a point lies between, with its weights for their shares.
