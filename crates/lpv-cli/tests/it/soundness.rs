@@ -136,8 +136,12 @@ fn a_badly_scaled_plant_is_not_called_unstabilisable() {
     assert!(!ended.err.contains("stabilisable:"), "{}", ended.err);
     let text = place.read("stabilisable.toml").replace("slpvqr", "lpvqr").replace("gamma = 1\n", "");
     place.write("regulator.toml", text);
-    place.succeed("design regulator.toml --out designs");
-    let certificate = parsed(&place.succeed("certify designs/design-low.json --json"));
-    let decrease = certificate["claims"].as_array().unwrap().iter().find(|claim| claim["id"] == "lyapunov-definite");
-    assert_eq!(decrease.unwrap()["verdict"], "proved", "{certificate}");
+    // its bound of the cost is tight to rounding; that the gain stabilises is not
+    place.lpv("design regulator.toml --out designs");
+    let certificate = parsed(&place.lpv("certify designs/design-low.json --json").out);
+    let claims = certificate["claims"].as_array().unwrap();
+    for id in ["lyapunov-definite", "invariance", "sampled-stability"] {
+        let claim = claims.iter().find(|claim| claim["id"] == id);
+        assert_eq!(claim.unwrap()["verdict"], "proved", "{certificate}");
+    }
 }

@@ -254,8 +254,8 @@ impl Uncontrolled {
         let reaches = reachability(&self.a);
         let mut found = Found::None;
         let mut fewest = usize::MAX;
-        for i in 0..d {
-            let block: Vec<usize> = (0..d).filter(|&j| reaches[i][j] && reaches[j][i]).collect();
+        for (i, from_here) in reaches.iter().enumerate() {
+            let block: Vec<usize> = (0..d).filter(|&j| from_here[j] && reaches[j][i]).collect();
             if block[0] != i {
                 continue;
             }
@@ -269,7 +269,7 @@ impl Uncontrolled {
                 }
                 Some(false) => {
                     // yᵀA_u = λyᵀ for a y on those that the block leads to; with the fewest of them no other such block is among them
-                    let all: Vec<usize> = (0..d).filter(|&j| reaches[i][j]).collect();
+                    let all: Vec<usize> = (0..d).filter(|&j| from_here[j]).collect();
                     if all.len() < fewest {
                         fewest = all.len();
                         found = Found::States { all, block };

@@ -16,10 +16,8 @@ use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, quadratic_form};
 use crate::model::FrozenModel;
 
-/// The least ε.
-pub(super) const LEAST_FACTOR: f64 = 1e-6;
 /// The ε that are tried, smallest first.
-const FACTORS: [f64; 5] = [LEAST_FACTOR, 1e-5, 1e-4, 1e-3, 1e-2];
+const FACTORS: [f64; 5] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2];
 /// The largest ε of a design for a moving parameter: what needs more is met by a finer schedule or a finer grid.
 const LARGEST_MOVING: f64 = 1e-3;
 /// What is added to the ε of a design for a moving parameter, so that a proof does not need cells without number: what holds by

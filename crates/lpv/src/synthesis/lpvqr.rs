@@ -1,11 +1,10 @@
 //! LPVQR: the quadratic regulator at each frozen parameter, Theorem 4.5 (Theorem 2.1 for a plant without parameter).
 
-use super::back_off::{LEAST_FACTOR, mixtures_hold};
 use super::inequality::{InverseWeights, performance, solve};
 use super::{CostWeights, FrozenDesign, SynthesisError};
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, trace};
-use crate::math::riccati::{self, Regulator};
+use crate::math::riccati;
 use crate::model::FrozenModel;
 use lmi::Problem;
 
@@ -35,32 +34,15 @@ pub(super) fn frozen(model: &FrozenModel, weights: &CostWeights) -> Result<Froze
     let reason = || "P of the Riccati equation is not positive definite after rounding".to_owned();
     let y = inverse_spd(&regulator.p).ok_or_else(|| SynthesisError::Inaccurate { rho: model.rho, reason: reason() })?;
     let trace_y = trace(&y);
-    let p = made_strict(model, weights, &regulator);
     // the solver may stop short where weights or states differ much in size; the gain does not need it
     let by_inequality = lqr_by_inequality(model, weights).ok();
     Ok(FrozenDesign {
         rho: model.rho,
         gain: regulator.k,
         auxiliary_gain: None,
-        p,
+        p: regulator.p,
         trace_y,
         riccati_difference: by_inequality.as_ref().map(|(y, ..)| (trace(y) / trace_y - 1.0).abs()),
         iterations: by_inequality.map_or(0, |(.., iterations)| iterations),
     })
-}
-
-/// P of the Riccati equation where backing it off by the least factor makes the inequality strict; else P + εX of [`riccati::strict`], with ten times
-/// the least ε = 10⁻¹⁴, 10⁻¹³, … that does: where states differ much in size, rounding of P is more than its factor gives.
-fn made_strict(model: &FrozenModel, weights: &CostWeights, regulator: &Regulator) -> Mat<f64> {
-    let n = model.a.nrows();
-    let holds = |p: &Mat<f64>| {
-        let backed_off = Mat::from_fn(n, n, |i, j| (1.0 + LEAST_FACTOR) * p[(i, j)]);
-        mixtures_hold(model, weights, &backed_off, &regulator.k, None, None)
-    };
-    if holds(&regulator.p) {
-        return regulator.p.clone();
-    }
-    let at = |epsilon: f64| riccati::strict((&model.a, &model.b), (&weights.q, &weights.r), regulator, epsilon);
-    let least = (0..10).map(|step| 1e-14 * 10.0_f64.powi(step)).find(|&epsilon| at(epsilon).is_some_and(|p| holds(&p)));
-    least.and_then(|epsilon| at(10.0 * epsilon)).unwrap_or_else(|| regulator.p.clone())
 }
