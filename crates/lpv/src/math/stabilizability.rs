@@ -6,9 +6,9 @@
 //! two, so that all of this can be calculated without rounding:
 //!
 //! 1. full rank of [B, AB, …] modulo one prime proves controllability, which is the common case and takes microseconds;
-//! 2. else W is found modulo primes and turned into fractions ([`super::residue`]); that WB = 0 and WA = A_u W is then checked on integers,
+//! 2. else W is found modulo primes and turned into fractions (`residue.rs`); that WB = 0 and WA = A_u W is then checked on integers,
 //!    and that there are no more rows is what the rank modulo a prime proves;
-//! 3. the eigenvalues of A_u are counted by Hermite's criterion ([`super::hurwitz`]).
+//! 3. the eigenvalues of A_u are counted by Hermite's criterion (`hurwitz.rs`).
 //!
 //! Floating point takes part only in the words about a mode that was found: its eigenvalue and the shares of the states.
 //! The answer is about the doubles as they are. A coupling of 10⁻³⁰⁰ controls; that a gain for it would be of no use is another matter.

@@ -331,7 +331,12 @@ fn regulate(
                     return Ok(design);
                 }
             }
-            Err(RiccatiError::Unweighted(mode)) => undetectable = Some(mode),
+            // that the objective has no bound follows for a pair that is stabilisable
+            Err(RiccatiError::Unweighted(mode))
+                if stabilizability(polytope.a(0), polytope.b(0)) == Stabilizability::Stabilizable =>
+            {
+                undetectable = Some(mode);
+            }
             Err(_) => {}
         }
     }
