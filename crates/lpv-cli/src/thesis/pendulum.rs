@@ -64,7 +64,7 @@ fn optimized(lyapunov: Lyapunov, objective: Objective) -> Result<Solution, Failu
     };
     let failed = |source| Failure::Synthesis { controller: "pendulum".into(), source };
     let design = synthesize(&polytope(), &request).map_err(failed)?;
-    design.solution.ok_or_else(|| Failure::Defect("the pendulum has no regulator".into()))
+    design.solution.ok_or_else(|| Failure::Defect("no regulator of the pendulum was found".into()))
 }
 
 fn bounded_rate(speed: f64) -> Lyapunov {

@@ -126,3 +126,22 @@ fn what_was_asked_is_what_is_answered() {
 fn a_governor_that_forgets_the_parameters_motion_is_refused() {
     place("gov_flow0.json").lpv("certify gov_flow0.json").refuses(2, &["parameter_flow", "the plant's"]);
 }
+
+/// Stiff states beside slow ones: a tolerance took the rank for deficient. The low gain is beyond the solver, which says just that.
+#[test]
+fn a_badly_scaled_plant_is_not_called_unstabilisable() {
+    let place = place("stabilisable.toml");
+    let ended = place.lpv("run stabilisable.toml");
+    ended.refuses(4, &["the solver stopped short"]);
+    assert!(!ended.err.contains("stabilisable:"), "{}", ended.err);
+    let text = place.read("stabilisable.toml").replace("slpvqr", "lpvqr").replace("gamma = 1\n", "");
+    place.write("regulator.toml", text);
+    // its bound of the cost is tight to rounding; that the gain stabilises is not
+    place.lpv("design regulator.toml --out designs");
+    let certificate = parsed(&place.lpv("certify designs/design-low.json --json").out);
+    let claims = certificate["claims"].as_array().unwrap();
+    for id in ["lyapunov-definite", "invariance", "sampled-stability"] {
+        let claim = claims.iter().find(|claim| claim["id"] == id);
+        assert_eq!(claim.unwrap()["verdict"], "proved", "{certificate}");
+    }
+}

@@ -6,9 +6,9 @@
 //! two, so that all of this can be calculated without rounding:
 //!
 //! 1. full rank of [B, AB, …] modulo one prime proves controllability, which is the common case and takes microseconds;
-//! 2. else W is found modulo primes and turned into fractions ([`super::residue`]); that WB = 0 and WA = A_u W is then checked on integers,
+//! 2. else W is found modulo primes and turned into fractions (`residue.rs`); that WB = 0 and WA = A_u W is then checked on integers,
 //!    and that there are no more rows is what the rank modulo a prime proves;
-//! 3. the eigenvalues of A_u are counted by Hermite's criterion ([`super::hurwitz`]).
+//! 3. the eigenvalues of A_u are counted by Hermite's criterion (`hurwitz.rs`).
 //!
 //! Floating point takes part only in the words about a mode that was found: its eigenvalue and the shares of the states.
 //! The answer is about the doubles as they are. A coupling of 10⁻³⁰⁰ controls; that a gain for it would be of no use is another matter.
@@ -254,8 +254,8 @@ impl Uncontrolled {
         let reaches = reachability(&self.a);
         let mut found = Found::None;
         let mut fewest = usize::MAX;
-        for i in 0..d {
-            let block: Vec<usize> = (0..d).filter(|&j| reaches[i][j] && reaches[j][i]).collect();
+        for (i, from_here) in reaches.iter().enumerate() {
+            let block: Vec<usize> = (0..d).filter(|&j| from_here[j] && reaches[j][i]).collect();
             if block[0] != i {
                 continue;
             }
@@ -269,7 +269,7 @@ impl Uncontrolled {
                 }
                 Some(false) => {
                     // yᵀA_u = λyᵀ for a y on those that the block leads to; with the fewest of them no other such block is among them
-                    let all: Vec<usize> = (0..d).filter(|&j| reaches[i][j]).collect();
+                    let all: Vec<usize> = (0..d).filter(|&j| from_here[j]).collect();
                     if all.len() < fewest {
                         fewest = all.len();
                         found = Found::States { all, block };

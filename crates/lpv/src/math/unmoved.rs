@@ -24,6 +24,12 @@ pub fn unmoved_point(vertices: &Vertices, weights: &[f64], w: &[f64]) -> Option<
     [false, true].into_iter().find_map(|at_rest| Equations::new(vertices, w, at_rest)?.solve(weights))
 }
 
+/// Whether doubles sum to zero, exactly.
+pub fn sum_is_zero(values: &[f64]) -> bool {
+    let row = Mat::from_fn(1, values.len(), |_, j| values[j]);
+    integers(&row, |_, _| 0).is_some_and(|(row, _)| row[0].iter().sum::<BigInt>().sign() == Sign::NoSign)
+}
+
 /// Rows of coefficients of λ and of the ρᵢ, and of right sides.
 struct Equations {
     rows: Integers,
@@ -125,6 +131,12 @@ mod tests {
         let decaying = from_rows(&[vec![-f64::from_bits(1)]]);
         let vertices = [(&decaying, &b[0]), (&decaying, &b[1])];
         assert_eq!(unmoved_point(&vertices, &[0.75, 0.25], &[1.0]), None, "it decays");
+    }
+
+    #[test]
+    fn sums() {
+        assert!(sum_is_zero(&[]) && sum_is_zero(&[-0.0]) && sum_is_zero(&[0.5, 1e300, -0.5, -1e300]));
+        assert!(!sum_is_zero(&[1e16, 1.0, -1e16]) && !sum_is_zero(&[f64::NAN]) && !sum_is_zero(&[0.1, 0.2, -0.3]));
     }
 
     /// w has to be right to the last digit.

@@ -38,6 +38,7 @@ use crate::math::eigen::smallest_eigenvalue;
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
 use crate::math::riccati::{self, Regulator, RiccatiError};
 use crate::math::stabilizability::{Mode, Stabilizability, stabilizability};
+use crate::math::unmoved::sum_is_zero;
 use crate::model::{FrozenModel, Polytope};
 use inequality::{DoubleSum, Unknowns, Weights};
 use lmi::{Answer, BlockReport, Carrier, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
@@ -290,12 +291,12 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     Ok(design)
 }
 
-/// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean tells.
+/// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean, taken exactly, tells.
 fn rests(lyapunov: &Lyapunov) -> bool {
     let Lyapunov::ParameterDependent { rate_vertices } = lyapunov else { return true };
-    let mean = |i: usize| rate_vertices.iter().map(|nu| nu[i]).sum::<f64>();
+    let rates = |i: usize| rate_vertices.iter().map(|nu| nu[i]).collect::<Vec<f64>>();
     rate_vertices.iter().any(|nu| nu.iter().all(|&rate| rate == 0.0))
-        || rate_vertices.first().is_some_and(|first| (0..first.len()).all(|i| mean(i) == 0.0))
+        || rate_vertices.first().is_some_and(|first| (0..first.len()).all(|i| sum_is_zero(&rates(i))))
 }
 
 /// The stability inequalities of the vertices that a point lies between, with its weights for their shares.
@@ -395,7 +396,12 @@ fn regulate(
                     return Ok(design);
                 }
             }
-            Err(RiccatiError::Unweighted(mode)) => undetectable = Some(mode),
+            // that the objective has no bound follows for a pair that is stabilisable
+            Err(RiccatiError::Unweighted(mode))
+                if stabilizability(polytope.a(0), polytope.b(0)) == Stabilizability::Stabilizable =>
+            {
+                undetectable = Some(mode);
+            }
             Err(_) => {}
         }
     }

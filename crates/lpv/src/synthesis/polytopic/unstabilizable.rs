@@ -54,6 +54,8 @@ struct Guess {
     residual: f64,
 }
 
+/// States that are tried by themselves.
+const MOST_ALONE: usize = 4;
 /// Share of a state, of the largest, below which it counts as rounding.
 const SMALL_SHARE: f64 = 1e-7;
 /// Relative residual up to which a mode seems to be unmoved.
@@ -129,7 +131,9 @@ fn proved(polytope: &Polytope, guess: Guess) -> UnstabilizablePoint {
     let shares: Vec<f64> =
         guess.w.iter().map(|x| if x.abs() > SMALL_SHARE * largest { x / largest } else { 0.0 }).collect();
     let alone = |i: usize| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
-    let tried = std::iter::once(shares.clone()).chain((0..n).filter(|&i| shares[i] != 0.0).map(alone));
+    let mut moving: Vec<usize> = (0..n).filter(|&i| shares[i] != 0.0).collect();
+    moving.sort_by(|&i, &j| shares[j].abs().total_cmp(&shares[i].abs()));
+    let tried = std::iter::once(shares.clone()).chain(moving.into_iter().take(MOST_ALONE).map(alone));
     let found = tried.into_iter().find_map(|w| {
         let (weights, eigenvalue) = unmoved_point(&vertices, &guess.weights, &w)?;
         Some(UnstabilizablePoint {
