@@ -458,8 +458,8 @@ impl Report {
         let message = format!("{}: {}{place}: {}", path.display(), self.status, self.verdict_reason);
         match self.status {
             "solved" => None,
-            "inaccurate" => Some(Failure::NotCertified(message)),
-            _ => Some(Failure::NoOptimum(message + &self.relaxation())),
+            "infeasible" | "unbounded" => Some(Failure::NoOptimum(message + &self.relaxation())),
+            _ => Some(Failure::NotCertified(message + &self.relaxation())),
         }
     }
 
