@@ -383,7 +383,7 @@ impl Entries {
         let rounding = 4.0 * f64::EPSILON * size * (size + rows.len() as f64 + 8.0);
         let errors: f64 = error_square.iter().zip(&units).map(|(square, unit)| square * unit * unit).sum();
         let least = (shift - rounding).max(0.0).sqrt() - 1.001 * errors.sqrt() - 8.0 * f64::EPSILON * size.sqrt();
-        if !(least > 0.0) {
+        if least.is_nan() || least <= 0.0 {
             return;
         }
         let (a, b) = (1.001 * a_square.sqrt() / least, 1.001 * b_square.sqrt() / least);

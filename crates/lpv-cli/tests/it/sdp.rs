@@ -68,7 +68,7 @@ fn words_are_no_stronger_than_proofs() {
         ("1", &["solved to tolerance", "inaccurate"], Some(4)),
         ("1.00000001", &["solved", "solved to tolerance"], None),
     ] {
-        place.write("interval.dat-s", &format!("1\n1\n-2\n1\n0 1 1 1 1\n1 1 1 1 1\n0 1 2 2 -{b}\n1 1 2 2 -1\n"));
+        place.write("interval.dat-s", format!("1\n1\n-2\n1\n0 1 1 1 1\n1 1 1 1 1\n0 1 2 2 -{b}\n1 1 2 2 -1\n"));
         let ended = place.lpv("sdp interval.dat-s --json");
         let record: serde_json::Value = serde_json::from_str(&ended.out).unwrap();
         let status = record["status"].as_str().unwrap();
