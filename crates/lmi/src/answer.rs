@@ -13,7 +13,7 @@ use std::fmt;
 #[derive(Clone, Debug, Serialize)]
 pub enum Outcome {
     /// Optimal, and proved: `G_b(x) ⪰ 0` for every block at the answer's x (`≻ 0` for strict inequalities), so that its objective
-    /// p ([`Answer::attained`]) is attained, and no x has a better one than d ([`Answer::optimum_bound`], for all x or those within its reach), with
+    /// p ([`Answer::attained`]) is attained, and no x whatever has a better one than d ([`Answer::optimum_bound`]), with
     ///
     /// ```text
     /// |p − d| / (1 + |p| + |d|) ≤ 10⁻⁵.
@@ -72,8 +72,8 @@ impl Outcome {
 pub struct Tolerance {
     /// Proved: `G_b(x) ⪰ −violation·I` for every block. Zero where the point is proved to be feasible.
     pub violation: f64,
-    /// Proved relative distance of the objective that is attained from the bound on the optimum, `|p − d| / (1 + |p| + |d|)`; ∞ where one of the
-    /// two is not proved.
+    /// Proved relative distance of the objective that is attained from the bound on the optimum, `|p − d| / (1 + |p| + |d|)`; the bound may be one
+    /// for x within its [reach](OptimumBound::reach) only. ∞ where one of the two is not proved.
     pub gap: f64,
 }
 

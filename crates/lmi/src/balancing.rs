@@ -116,6 +116,9 @@ fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> 
     }
     let divided = |d: f64, value: f64| value * d / omega;
     scale_matrices(program, factors, &mut solution.point.z, divided);
+    if let Some(inner) = &mut solution.inner {
+        scale_matrices(program, factors, inner, divided);
+    }
     if let Some(centre) = &mut solution.centre {
         unscale(&mut centre.x);
         scale_matrices(program, factors, &mut centre.s, |d, value| value / d);

@@ -23,6 +23,8 @@ const BACK_OFF: f64 = 1e-6;
 /// Largest relative gap of a point that is called solved, and what the dual residual may take from it.
 pub(crate) const SOLVED_GAP: f64 = 1e-7;
 const SOLVED_UNCERTAINTY: f64 = 1e-6;
+/// Dual residual of multipliers that are kept for proofs, against the tolerance.
+const INNER: f64 = 1e-2;
 /// Relative gap at which a point is kept for neighbouring problems to begin at.
 const CENTRAL: f64 = 3e-2;
 /// Where x still grows by this factor in each of so many last iterations, as the gap closes or until no progress is made, no x attains the
@@ -88,6 +90,8 @@ pub(crate) struct Solution {
     pub dual_objective: f64,
     /// A strictly feasible x not far from the optimum, to back off to.
     pub interior: Option<Vec<f64>>,
+    /// Multipliers not far from the optimum that are well inside and met the dual equations.
+    pub inner: Option<Vec<Vec<f64>>>,
     /// Where a neighbouring problem may begin.
     pub centre: Option<Centre>,
     /// Sensible units of the unknowns.
@@ -179,6 +183,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let mut since_progress = 0;
     let mut best_witness = f64::INFINITY;
     let mut interior = None;
+    let mut inner = None;
     let mut centre = None;
     // ‖x‖ of every iteration.
     let mut sizes: Vec<f64> = Vec::new();
@@ -204,6 +209,9 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         let Residuals { primal, dual, gap, uncertainty } = status.residuals;
         if it.feasible && gap > BACK_OFF {
             copy(&it.x, interior.get_or_insert_default());
+        }
+        if dual <= INNER * options.feasibility_tolerance && gap > BACK_OFF && gap <= CENTRAL {
+            it.copy_multipliers(inner.get_or_insert_default());
         }
         if it.feasible && gap <= CENTRAL && centre.is_none() {
             centre = Some(it.centre());
@@ -264,7 +272,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let status = best.map_or_else(|| it.status(), |(_, status)| status);
     let units = program.scale.clone();
     let Status { residuals, dual_objective, .. } = status;
-    Solution { point, ending, residuals, dual_objective, interior, centre, units, log }
+    Solution { point, ending, residuals, dual_objective, interior, inner, centre, units, log }
 }
 
 /// Whether the objective came closer to its bound only as x grew, from the norms of x in each iteration.
@@ -336,8 +344,12 @@ impl<'a> Iteration<'a> {
 
     fn copy_point(&self, to: &mut Point) {
         copy(&self.x, &mut to.x);
-        to.z.resize_with(self.blocks.len(), Vec::new);
-        to.z.iter_mut().zip(&self.blocks).for_each(|(to, block)| copy(&block.z, to));
+        self.copy_multipliers(&mut to.z);
+    }
+
+    fn copy_multipliers(&self, to: &mut Vec<Vec<f64>>) {
+        to.resize_with(self.blocks.len(), Vec::new);
+        to.iter_mut().zip(&self.blocks).for_each(|(to, block)| copy(&block.z, to));
     }
 
     /// R = F(x) − S, closed exactly as soon as F(x) itself is positive definite; A(Z).

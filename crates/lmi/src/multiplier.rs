@@ -95,7 +95,7 @@ fn weights(z: &Mat<f64>) -> Option<Vec<f64>> {
         enclosure.smallest_eigenvalue_bound(&Spectrum::of(&scaled))
     };
     // Far above what underflow may have done to the scaled entries.
-    if !(lambda > LEAST) {
+    if lambda.is_nan() || lambda <= LEAST {
         return None;
     }
     let mut weights = vec![f64::INFINITY; n];

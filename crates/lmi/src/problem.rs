@@ -324,6 +324,16 @@ impl Original for Stated<'_> {
         self.problem.objective.as_ref().is_some_and(|(_, objective)| !objective.terms.is_empty())
     }
 
+    fn in_objective(&self, unknowns: usize) -> Vec<bool> {
+        let mut found = vec![false; unknowns];
+        if let Some((_, objective)) = &self.problem.objective {
+            objective.coefficients(self.layout, &mut |_, _, unknown, _| {
+                unknown.into_iter().for_each(|unknown| found[unknown] = true)
+            });
+        }
+        found
+    }
+
     fn change(&self, block: usize, direction: &[Mat<f64>]) -> Enclosure {
         Enclosure::of_change(&self.problem.inequalities[block].expression, &|unknown| &direction[unknown.index])
     }

@@ -42,6 +42,8 @@ pub(crate) trait Original {
     fn slope(&self, direction: &[Mat<f64>]) -> (f64, f64);
     /// Whether there is an objective that is not constant.
     fn has_objective(&self) -> bool;
+    /// For each of the scalar unknowns, whether it stands in the objective.
+    fn in_objective(&self, unknowns: usize) -> Vec<bool>;
     /// Proved upper bounds on `|Σ_b⟨F_{b,i}, Z_b⟩|`, or on `|Σ_b⟨F_{b,i}, Z_b⟩ − cᵢ|` for c of the minimised objective.
     fn gradient_bounds(&self, multipliers: &[Multiplier], with_objective: bool) -> Vec<f64>;
     /// Whether the margin of a block stands for a strict inequality.
@@ -94,12 +96,13 @@ pub(crate) fn report(
             residuals.gap = residuals.gap.max(relative(objective));
             let converged = objective.is_finite() && residuals.gap <= SOLVED_GAP;
             if converged && proof.tolerated {
-                let central = result.centre.as_ref().map(|centre| squares(&centre.z, &blocks));
+                let inner = result.inner.as_ref().map(|z| squares(z, &blocks));
                 let feasible = proof.proved;
-                let point = Optimal { values: &values, multipliers: &multipliers, central, feasible };
+                let point = Optimal { values: &values, multipliers: &multipliers, inner, feasible };
                 bounds = bracket(original, translation, &blocks, &point);
                 let gap = bounds.gap(translation.sign);
-                let solved = proof.proved && gap <= PROVED_GAP;
+                let for_all = bounds.bound.is_some_and(|bound| bound.reach.is_infinite());
+                let solved = proof.proved && for_all && gap <= PROVED_GAP;
                 let tolerance = Tolerance { violation: proof.violation, gap };
                 if solved { Outcome::Solved } else { Outcome::SolvedToTolerance(tolerance) }
             } else {

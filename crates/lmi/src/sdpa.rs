@@ -264,9 +264,9 @@ impl Sdp {
 }
 
 /// A problem as its coefficients state it.
-struct Stated<'a> {
-    sdp: &'a Sdp,
-    options: &'a Options,
+pub(crate) struct Stated<'a> {
+    pub sdp: &'a Sdp,
+    pub options: &'a Options,
 }
 
 impl Original for Stated<'_> {
@@ -316,6 +316,10 @@ impl Original for Stated<'_> {
 
     fn has_objective(&self) -> bool {
         self.sdp.objective.iter().any(|c| *c != 0.0)
+    }
+
+    fn in_objective(&self, _: usize) -> Vec<bool> {
+        self.sdp.objective.iter().map(|c| *c != 0.0).collect()
     }
 
     fn change(&self, block: usize, direction: &[Mat<f64>]) -> Enclosure {

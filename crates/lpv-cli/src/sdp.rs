@@ -87,7 +87,8 @@ fn detail(outcome: &Outcome) -> String {
     match outcome {
         Outcome::Solved => String::new(),
         Outcome::SolvedToTolerance(tolerance) if tolerance.violation == 0.0 => format!(
-            "the point is proved to be feasible; that it is optimal is proved to {}, relative",
+            "the point is proved to be feasible, and its objective to be within {} of the bound, relative; the bound is wider than \
+             that of a solved problem, or not one for every x",
             at_most(tolerance.gap)
         ),
         Outcome::SolvedToTolerance(tolerance) => format!(

@@ -9,8 +9,9 @@ use crate::verification::largest_entry;
 
 /// How much larger than the answer the points are that a bound speaks of which does not hold for all.
 const REACH: f64 = 10.0;
-/// What holding for every x may take from the bound, relative to the objective.
-const FOR_ALL: f64 = 1e-7;
+/// What holding for every x may take from the bound, relative to the objective; and what it is worth looking for better bounds to save.
+const LITTLE: f64 = 1e-7;
+const FOR_ALL: f64 = 1e-5;
 
 /// The bound on the optimum and the one that the answer attains.
 pub(super) struct Bracket {
@@ -36,8 +37,8 @@ impl Bracket {
 pub(super) struct Optimal<'a> {
     pub values: &'a [Mat<f64>],
     pub multipliers: &'a [Mat<f64>],
-    /// Multipliers on the way to the optimum, well inside.
-    pub central: Option<Vec<Mat<f64>>>,
+    /// Multipliers not far from the optimum that are well inside.
+    pub inner: Option<Vec<Mat<f64>>>,
     /// Whether the point is proved to be feasible.
     pub feasible: bool,
 }
@@ -77,10 +78,14 @@ struct Dual {
 }
 
 impl Dual {
-    fn new(original: &dyn Original, blocks: &[BlockReport], z: &[Mat<f64>]) -> Option<Self> {
+    fn new(original: &dyn Original, blocks: &[BlockReport], entries: &Entries, z: &[Mat<f64>]) -> Option<Self> {
         let multipliers: Vec<Multiplier> = z.iter().map(Multiplier::new).collect::<Option<_>>()?;
         let at_zero = at_zero(original, blocks, multipliers.iter().map(|z| &z.matrix));
-        let misses = original.gradient_bounds(&multipliers, true);
+        let mut misses = original.gradient_bounds(&multipliers, true);
+        let weighed = entries.weighed(&multipliers);
+        // Nothing is missed of an equation that says 0 = 0.
+        let absent = weighed.iter().zip(original.in_objective(misses.len())).map(|(weighed, cost)| !weighed && !cost);
+        misses.iter_mut().zip(absent).filter(|(_, absent)| *absent).for_each(|(miss, _)| *miss = 0.0);
         Some(Self { multipliers, objective: -at_zero.known - at_zero.error, misses })
     }
 }
@@ -92,22 +97,22 @@ fn optimum_bound(
     point: &Optimal<'_>,
     attained: Option<f64>,
 ) -> Option<OptimumBound> {
-    let dual = Dual::new(original, blocks, point.multipliers)?;
+    let (sizes, margins) = sizes_and_margins(original, blocks);
+    let entries = Entries::new(original, &sizes, &margins, translation.layout.len());
+    let dual = Dual::new(original, blocks, &entries, point.multipliers)?;
     let (d, misses) = (dual.objective, &dual.misses);
     let minimised = |objective: f64| translation.sign * (objective - translation.objective_constant);
-    let (sizes, margins) = sizes_and_margins(original, blocks);
-    let entries = Entries::new(original, &sizes, &margins, misses.len());
     // Complementarity of a point as far from the optimum as this one: at least what rounding leaves of it.
     let about = (minimised(original.objective(point.values)) - d).abs().max(f64::EPSILON * d.abs());
     let reach = entries.reach(&dual.multipliers, about.max(f64::MIN_POSITIVE));
-    let little = FOR_ALL * (1.0 + d.abs());
+    let little = LITTLE * (1.0 + d.abs());
     let mut everywhere = if taken(misses, &reach.b) < 1.0 { taken(misses, &reach.a) } else { f64::INFINITY };
     if everywhere > little
-        && let (Some(central), Some(p)) = (&point.central, attained)
-        && let Some(central) = Dual::new(original, blocks, central)
+        && let (Some(inner), Some(p)) = (&point.inner, attained)
+        && let Some(inner) = Dual::new(original, blocks, &entries, inner)
     {
         let p = minimised(p) + 4.0 * f64::EPSILON * (p.abs() + translation.objective_constant.abs());
-        everywhere = everywhere.min(near_center(&entries, &central, p, misses));
+        everywhere = everywhere.min(taken_near(&entries, &inner, p, misses));
     }
     let largest: Vec<Mat<f64>> = point
         .values
@@ -118,7 +123,7 @@ fn optimum_bound(
         })
         .collect();
     let near = taken(misses, &translation.layout.values(&largest));
-    let for_all = everywhere <= near.max(little);
+    let for_all = everywhere <= near.max(FOR_ALL * (1.0 + d.abs()));
     let (least, reach) = if for_all { (d - everywhere, f64::INFINITY) } else { (d - near, REACH) };
     let value = translation.objective_constant + translation.sign * least;
     // The last roundings.
@@ -126,14 +131,14 @@ fn optimum_bound(
     value.is_finite().then_some(OptimumBound { value, reach })
 }
 
-/// `Σ|rᵢ||xᵢ|` at most, for feasible x with cᵀx ≤ p: of the central multipliers `τ = cᵀx − d − Σrᵢxᵢ ≤ (p − d + Σ|rᵢ|aᵢ)/(1 − Σ|rᵢ|bᵢ)`.
-fn near_center(entries: &Entries, central: &Dual, p: f64, misses: &[f64]) -> f64 {
-    let distance = (p - central.objective).max(0.0) + 4.0 * f64::EPSILON * (p.abs() + central.objective.abs());
-    let reach = entries.reach(&central.multipliers, distance.max(f64::MIN_POSITIVE));
-    let share = taken(&central.misses, &reach.b);
+/// `Σ|rᵢ||xᵢ|` at most, for feasible x with cᵀx ≤ p: of the inner multipliers `τ = cᵀx − d − Σrᵢxᵢ ≤ (p − d + Σ|rᵢ|aᵢ)/(1 − Σ|rᵢ|bᵢ)`.
+fn taken_near(entries: &Entries, inner: &Dual, p: f64, misses: &[f64]) -> f64 {
+    let distance = (p - inner.objective).max(0.0) + 4.0 * f64::EPSILON * (p.abs() + inner.objective.abs());
+    let reach = entries.reach(&inner.multipliers, distance.max(f64::MIN_POSITIVE));
+    let share = taken(&inner.misses, &reach.b);
     if share.is_nan() || share > 0.9 {
         return f64::INFINITY;
     }
-    let tau = 1.001 * (distance + taken(&central.misses, &reach.a)) / (1.0 - share);
+    let tau = 1.001 * (distance + taken(&inner.misses, &reach.a)) / (1.0 - share);
     taken(misses, &reach.a) + tau * taken(misses, &reach.b)
 }

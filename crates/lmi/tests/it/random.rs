@@ -250,7 +250,8 @@ fn multipliers_without_interior() {
             "{seed}: {:?}",
             whole.outcome
         );
-        solved += usize::from(matches!(whole.outcome, Outcome::Solved));
+        // What y₀ may grow to is not bounded, and so no bound holds for every y.
+        solved += usize::from(whole.outcome.is_optimal());
         let difference = (whole.objective - reduced.objective).abs() / (1.0 + reduced.objective.abs());
         assert!(difference < 1e-6, "{seed}: {} {}", whole.objective, reduced.objective);
     }

@@ -73,7 +73,9 @@ fn no_scale_makes_a_stabilizable_plant_infeasible() {
             let (answer, trace) = double_integrator(matrix([[1.0, 0.0], [0.0, 1.0 / q2]]), r);
             let expected = closed_form(1.0, q2, r);
             match answer.outcome {
-                Outcome::Solved => assert!(close(trace, expected), "q₂ = {q2:e}, r = {r:e}: {trace} {expected}"),
+                Outcome::Solved | Outcome::SolvedToTolerance(_) => {
+                    assert!(close(trace, expected), "q₂ = {q2:e}, r = {r:e}: {trace} {expected}")
+                }
                 Outcome::Inaccurate(_) => {}
                 other => panic!("q₂ = {q2:e}, r = {r:e}: {other:?}"),
             }

@@ -207,10 +207,17 @@ fn small_slopes() {
         // 1 − |ε| x ≥ 0: x ≤ 1/|ε|, up to the rounding of the quotient.
         let end = [entry(Some(0), 1, 0, 0, -slope.abs()), entry(None, 1, 0, 0, -1.0)];
         let segment = [half_line, end.to_vec()].concat();
-        let far = -1.0 / slope.abs();
+        let s = slope.abs();
+        let far = -1.0 / s;
         let answer = solve(&[-1.0], &[BlockShape::Symmetric(1); 2], segment);
         let truth = Truth::Optimum(far * (1.0 + 1e-15), far * (1.0 - 1e-15));
         words.check(&answer, truth, &format!("x ≤ {:e}", -far));
+        // Far out, by little at each step: −s²x over 1 − s³x ≥ 0 is −1/s at best.
+        let far_end =
+            vec![entry(Some(0), 0, 0, 0, 1.0), entry(Some(0), 1, 0, 0, -s * s * s), entry(None, 1, 0, 0, -1.0)];
+        let answer = solve(&[-s * s], &[BlockShape::Symmetric(1); 2], far_end);
+        let optimum = -1.0 / s;
+        words.check(&answer, Truth::Optimum(optimum * (1.0 + 1e-14), optimum * (1.0 - 1e-14)), &format!("x ≤ {s:e}⁻³"));
     }
     words.print("small slopes");
     assert!(words.share("unbounded") > 0.15 && words.share("solved") > 0.2);
@@ -301,7 +308,8 @@ fn feasible_by_construction() {
     for seed in 0..120 {
         let mut numbers = Integers(1000 + seed);
         let n = 2 + (seed % 4) as usize;
-        let unknowns = 1 + (seed / 4 % 5) as usize;
+        // Fewer than entries: they bound the unknowns.
+        let unknowns = (1 + (seed / 4 % 5) as usize).min(n * (n + 1) / 2 - 1);
         let constant = numbers.definite(n, n);
         let mut matrices: Vec<Vec<i64>> = (0..unknowns).map(|_| numbers.symmetric(n)).collect();
         let bounded = seed % 2 == 0;

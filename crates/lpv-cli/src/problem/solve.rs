@@ -496,8 +496,9 @@ impl Report {
         let message = format!("{}: {}{place}: {}", path.display(), self.status, self.verdict_reason);
         match self.status {
             SOLVED => None,
+            "infeasible" | "unbounded" => Some(Failure::NoOptimum(message + &self.relaxation())),
             "inaccurate" => Some(Failure::NotCertified(message)),
-            _ => Some(Failure::NoOptimum(message + &self.relaxation())),
+            _ => Some(Failure::NotCertified(message + &self.relaxation())),
         }
     }
 

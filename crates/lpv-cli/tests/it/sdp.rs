@@ -57,3 +57,32 @@ fn files_that_are_no_problem() {
     }
     place.lpv("sdp missing.dat-s").refuses(2, &["missing.dat-s", "cannot be read"]);
 }
+
+/// 1 ≤ x ≤ b: infeasible by 10⁻⁸, an equation, feasible by 10⁻⁸. What is not proved has a softer word and another exit code, and no number is
+/// rounded to the wrong side or to zero.
+#[test]
+fn words_are_no_stronger_than_proofs() {
+    let place = Place::with("");
+    for (b, allowed, code) in [
+        ("0.99999999", &["infeasible", "solved to tolerance", "inaccurate"][..], None),
+        ("1", &["solved to tolerance", "inaccurate"], Some(4)),
+        ("1.00000001", &["solved", "solved to tolerance"], None),
+    ] {
+        place.write("interval.dat-s", format!("1\n1\n-2\n1\n0 1 1 1 1\n1 1 1 1 1\n0 1 2 2 -{b}\n1 1 2 2 -1\n"));
+        let ended = place.lpv("sdp interval.dat-s --json");
+        let record: serde_json::Value = serde_json::from_str(&ended.out).unwrap();
+        let status = record["status"].as_str().unwrap();
+        assert!(allowed.contains(&status), "{b}: {status}");
+        if let Some(code) = code {
+            ended.refuses(code, &[]);
+        }
+        let detail = record["detail"].as_str().unwrap();
+        if status == "solved to tolerance" {
+            assert!(detail.contains("at most") && !detail.contains("at most 0;"), "{b}: {detail}");
+            assert!(!place.lpv("sdp interval.dat-s").out.contains("≥ 0 "), "{b}");
+        }
+        let attained = record["attained"].as_f64();
+        assert!(attained.is_none_or(|p| p >= 1.0) && (b == "1.00000001" || attained.is_none()), "{b}: {attained:?}");
+        assert!(record["optimum_bound"].as_f64().is_none_or(|bound| bound <= 1.0), "{b}");
+    }
+}

@@ -2,9 +2,10 @@
 
 use super::SynthesisError;
 use crate::math::Mat;
+use crate::math::decimal::at_least;
 use crate::math::matrix::inverse_spd;
 use crate::model::FrozenModel;
-use lmi::{Answer, Expr, Options, Outcome, Problem};
+use lmi::{Answer, Expr, Options, Outcome, Problem, Witness};
 
 /// Q⁻¹ and R⁻¹, which the inequalities hold as constants.
 pub(super) struct InverseWeights {
@@ -69,16 +70,13 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
     let answer = problem.solve(&Options { gap_tolerance: GAP, ..Options::default() })?;
     match &answer.outcome {
         outcome if outcome.is_feasible() => Ok(answer),
-        Outcome::Infeasible(witness) | Outcome::InfeasibleWithin(witness) => {
-            let weight = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
-            let total: f64 = witness.multipliers.iter().map(weight).sum();
-            let mut shares: Vec<(f64, &str)> = (witness.multipliers.iter().zip(&answer.blocks))
-                .map(|(z, block)| (weight(z) / total, block.name.as_str()))
-                .collect();
-            shares.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let carriers =
-                shares.iter().take(3).map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share)).collect();
-            Err(SynthesisError::Infeasible { rho, radius: witness.excluded_radius, carriers })
+        Outcome::Infeasible(witness) => Err(SynthesisError::Infeasible { rho, carriers: carriers(&answer, witness) }),
+        Outcome::InfeasibleWithin(witness) => {
+            let (radius, carriers) = (at_least(witness.excluded_radius), carriers(&answer, witness).join(", "));
+            let reason = format!(
+                "no solution exists with entries up to {radius} times the problem's units; the contradiction is carried by: {carriers}"
+            );
+            Err(SynthesisError::Inaccurate { rho, reason })
         }
         Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_) => Err(SynthesisError::Unbounded { rho }),
         Outcome::Inaccurate(reason) => Err(SynthesisError::Inaccurate { rho, reason: reason.to_string() }),
@@ -87,4 +85,15 @@ pub(super) fn solve(problem: &Problem, rho: f64) -> Result<Answer, SynthesisErro
             Err(SynthesisError::Inaccurate { rho, reason })
         }
     }
+}
+
+/// The inequalities with the largest multipliers, with their share.
+fn carriers(answer: &Answer, witness: &Witness) -> Vec<String> {
+    let weight = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
+    let total: f64 = witness.multipliers.iter().map(weight).sum();
+    let mut shares: Vec<(f64, &str)> = (witness.multipliers.iter().zip(&answer.blocks))
+        .map(|(z, block)| (weight(z) / total, block.name.as_str()))
+        .collect();
+    shares.sort_by(|a, b| b.0.total_cmp(&a.0));
+    shares.iter().take(3).map(|(share, name)| format!("{name} ({:.0} %)", 100.0 * share)).collect()
 }

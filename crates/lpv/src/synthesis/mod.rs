@@ -42,7 +42,6 @@ pub use region::covering_level;
 pub use supervision::{GovernorOptions, Supervision, SupervisionError, design_supervised, governed_states, governor};
 pub use validation::DesignError;
 
-use crate::math::decimal::at_least;
 
 /// Why there is no design.
 #[derive(Debug, thiserror::Error)]
@@ -55,17 +54,11 @@ pub enum SynthesisError {
         /// The reason.
         source: crate::math::riccati::RiccatiError,
     },
-    /// The inequalities contradict each other, for unknowns up to a size.
-    #[error(
-        "the inequalities have no solution with unknowns up to {} at parameter {rho:.6}; the contradiction is carried by: {}",
-        at_least(*radius),
-        carriers.join(", ")
-    )]
+    /// The inequalities contradict each other, which is proved.
+    #[error("the inequalities have no solution at parameter {rho:.6}; the contradiction is carried by: {}", carriers.join(", "))]
     Infeasible {
         /// Parameter value.
         rho: f64,
-        /// What is proved: size of the unknowns, in the units of the balanced problem, up to which there is none.
-        radius: f64,
         /// The inequalities with the largest multipliers, largest first, with their share.
         carriers: Vec<String>,
     },
