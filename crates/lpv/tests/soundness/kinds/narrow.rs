@@ -33,7 +33,7 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     let mut weights = CostWeights { q: identity(1), r: identity(1) };
     let (mut y, mut limits, mut gamma) = ([1.0, 0.0, 0.0], InputLimits::none(1), None);
     let a;
-    match numbers.below(5) {
+    match numbers.below(6) {
         // the decrease is 2(k − a)y
         0 => a = valley(-c, at, w, k),
         // with the parameter's motion: 2(k − a)y ± r y′
@@ -43,6 +43,12 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
             // 2(k − a) = r|y′| + c((ρ − ρ₀)² − w), but for y, which is 1 at most of the places: there it fails or not
             y[0] -= slope * at;
             a = valley(-0.5 * c, at, w, k - 0.5 * rate * slope.abs());
+        }
+        // a hump that comes down to next to nothing, or below, at one end of the range
+        5 => {
+            let end = numbers.of(&[1.0, -1.0]);
+            let from = -end * at.abs();
+            a = valley(c, from, (end - from) * (end - from) - w, k);
         }
         // y itself
         2 => {
