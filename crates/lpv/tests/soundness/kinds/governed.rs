@@ -115,7 +115,7 @@ fn is_a_motion(design: &Design, farthest: f64) -> Result<(), String> {
         for (step, input) in motion.inputs.iter().enumerate() {
             let mut rest = &z[step] - &model.b * constant(input);
             if let Some(next) = z.get(step + 1) {
-                rest = rest - &model.a * next;
+                rest -= &model.a * next;
             }
             (0..n).for_each(|i| w[i] += peaks[step] * farthest * rest[(i, j)]);
         }

@@ -93,10 +93,5 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     };
     let constant = |value: f64| MatrixFunction::constant(Mat::from_fn(1, 1, |_, _| value));
     let of = scheduled.build(Family::new(basis(a), constant(1.0), [-1.0, 1.0], false));
-    attack(numbers, tally, &of, &ProofOptions::default(), &[at, -1.0, 1.0, numbers_near(at)]).map(|_| ())
-}
-
-/// Another place, for flights.
-fn numbers_near(at: f64) -> f64 {
-    (at + 0.125).min(1.0)
+    attack(numbers, tally, &of, &ProofOptions::default(), &[at, -1.0, 1.0, (at + 0.125).min(1.0)]).map(|_| ())
 }
