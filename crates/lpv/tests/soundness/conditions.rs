@@ -1,5 +1,5 @@
-//! What a verdict says, evaluated in exact arithmetic at single values of the parameter: every condition behind a claim that is proved,
-//! and the motion behind one that is refuted.
+//! What a verdict says, evaluated in exact arithmetic at single values of the parameter: every condition behind a
+//! claim that is proved, and the motion behind one that is refuted.
 
 use crate::exact::{Dyadic, Exact, lyapunov};
 use lpv::certificate::{Claim, ClaimKind, Motion, Verdict, Witness};
@@ -306,8 +306,8 @@ pub fn check_premises(claims: &[Claim]) -> Result<(), String> {
     Ok(())
 }
 
-/// Every claim that is proved holds at these points, and what it rests on stands; every claim that is refuted is broken at its witness.
-/// Counts the witnesses.
+/// Every claim that is proved holds at these points, and what it rests on stands; every claim that is refuted is
+/// broken at its witness. Counts the witnesses.
 pub fn check(
     claims: &[Claim],
     bounds: &Bounds,

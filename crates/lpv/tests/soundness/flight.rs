@@ -1,8 +1,8 @@
 //! Flights of the saturated LPV loop from the edge of a proved set, against a parameter that moves as badly as it may.
 //!
-//! ẋ = A(ρ)x − B(ρ) sat(K(ρ)x), Runge–Kutta of fourth order; ρ̇ is chosen at every step among the extreme rates, so that V grows most
-//! (greedy). At every step: V̇ is not positive, V is not above what it was, inputs that are claimed to stay unsaturated do, and the
-//! cost so far is below its bound.
+//! ẋ = A(ρ)x − B(ρ) sat(K(ρ)x), Runge–Kutta of fourth order; ρ̇ is chosen at every step among the extreme rates, so
+//! that V grows most (greedy). At every step: V̇ is not positive, V is not above what it was, inputs that are claimed
+//! to stay unsaturated do, and the cost so far is below its bound.
 
 use lpv::math::Mat;
 use lpv::math::eigen::symmetric_eigenvectors;

@@ -1,5 +1,5 @@
-//! Claims that fail on a narrow interval of the parameter only, away from the middles of cells and from grid points, or by next to nothing
-//! not at all.
+//! Claims that fail on a narrow interval of the parameter only, away from the middles of cells and from grid points,
+//! or by next to nothing not at all.
 
 use super::attack;
 use crate::Tally;

@@ -92,7 +92,8 @@ pub fn generate(numbers: &mut Numbers) -> Option<PolytopicClaim> {
     })
 }
 
-/// Two vertices whose inputs act in opposite directions, with gains to match: halfway no input acts, and a alone is left.
+/// Two vertices whose inputs act in opposite directions, with gains to match: halfway no input acts, and a alone is
+/// left.
 fn opposed(numbers: &mut Numbers) -> Option<PolytopicClaim> {
     let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
     let [b, k, p] = [0, 1, 2].map(|_| 0.5 + numbers.unit());
@@ -118,8 +119,8 @@ fn opposed(numbers: &mut Numbers) -> Option<PolytopicClaim> {
     Some(PolytopicClaim { polytope, lyapunov, auxiliary_gain: None, weights: Some(weights), saturation: None })
 }
 
-/// Two vertices at which the cost is just below its bound, and halfway it is just below or above it: with b ± d and k ± e the conditions of
-/// the vertices are δ each, and that of the pair is 2δ − (8pde − 2re²).
+/// Two vertices at which the cost is just below its bound, and halfway it is just below or above it: with b ± d and k
+/// ± e the conditions of the vertices are δ each, and that of the pair is 2δ − (8pde − 2re²).
 fn tight_between(numbers: &mut Numbers, [b, k, p]: [f64; 3], weights: CostWeights) -> Option<PolytopicClaim> {
     let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
     let (q, r) = (weights.q[(0, 0)], weights.r[(0, 0)]);

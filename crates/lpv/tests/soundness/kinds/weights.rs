@@ -1,5 +1,5 @@
-//! Weights of small integers, singular and indefinite ones among them; matrices that differ from symmetric ones by one unit in the last
-//! place.
+//! Weights of small integers, singular and indefinite ones among them; matrices that differ from symmetric ones by
+//! one unit in the last place.
 
 use crate::Tally;
 use crate::conditions::{Bounds, check};
