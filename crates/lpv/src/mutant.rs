@@ -1,7 +1,7 @@
 //! Defects of the prover, one at a time, for the suite that has to find them (`validation/mutants`).
 //!
-//! With the feature `mutants`, which no other build has, the environment variable `LPV_MUTANT` names one of [`TABLE`] and the prover is wrong
-//! in that way. Without it [`is`] is the constant `false`, and the hooks vanish.
+//! With the feature `mutants`, which no other build has, the environment variable `LPV_MUTANT` names one of `TABLE`
+//! and the prover is wrong in that way. Without it `is` is the constant `false`, and the hooks vanish.
 
 /// Whether this defect is switched on.
 #[cfg(not(feature = "mutants"))]

@@ -1,5 +1,5 @@
-//! Files of every format with something wrong in them, a character or a number: never a panic, exit codes as documented, and never the word
-//! `proved` for what the changed numbers make false.
+//! Files of every format with something wrong in them, a character or a number: never a panic, exit codes as
+//! documented, and never the word `proved` for what the changed numbers make false.
 
 use crate::program::{DOUBLE_INTEGRATOR, Ended, Place, QUADROTOR};
 use lpv::math::Mat;
@@ -271,8 +271,14 @@ fn designs_with_a_number_changed() {
         "poly_not_definite.json",
     ];
     let (place, mut numbers) = (Place::with(""), Numbers(1));
-    let extra = json!({"model": {"A": [[[0, 1], [1, -0.1]], [[0, 1], [0, -0.1]]], "B": [[0], [1]]}, "K": [[3, 3]], "P": [[4, 1], [1, 1]],
-        "sigma": [2.0], "gamma": 0.1, "weights": {"Q": [[0.5, 0], [0, 0.5]], "R": [[0.1]]}});
+    let extra = json!({
+        "model": {"A": [[[0, 1], [1, -0.1]], [[0, 1], [0, -0.1]]], "B": [[0], [1]]},
+        "K": [[3, 3]],
+        "P": [[4, 1], [1, 1]],
+        "sigma": [2.0],
+        "gamma": 0.1,
+        "weights": {"Q": [[0.5, 0], [0, 0.5]], "R": [[0.1]]},
+    });
     let bases: Vec<Value> =
         files.iter().map(|name| serde_json::from_str(&case(name)).unwrap()).chain([extra]).collect();
     let codes = (0..240).map(|k| certify(&place, &miscounted(&mut numbers, &bases[k % bases.len()]).to_string()));
@@ -328,7 +334,8 @@ fn governed_designs_with_a_number_changed() {
     assert!(codes.get(&2).is_some_and(|count| *count > 20), "{codes:?}");
 }
 
-/// Problems over polytopes and of the induced norm: what is answered is a design that can be certified, or one line says why not.
+/// Problems over polytopes and of the induced norm: what is answered is a design that can be certified, or one line
+/// says why not.
 #[test]
 fn problems_with_something_changed() {
     let (place, mut numbers) = (Place::with(""), Numbers(4));

@@ -1,5 +1,5 @@
-//! What a verdict says, evaluated in exact arithmetic at single values of the parameter: every condition behind a claim that is proved,
-//! and the motion behind one that is refuted.
+//! What a verdict says, evaluated in exact arithmetic at single values of the parameter: every condition behind a
+//! claim that is proved, and the motion behind one that is refuted.
 
 use crate::exact::{Dyadic, Exact, lyapunov};
 use lpv::certificate::{Claim, ClaimKind, Motion, Verdict, Witness};
@@ -245,10 +245,10 @@ impl Point {
                         (self.high.times(&inverse), d)
                     }
                 };
-                // d A_c and d²(Q + KᵀRK) as a loop slower by d: its cost matrix is d X
+                // |d| A_c with d²(Q + KᵀRK) is the same loop in another time: its cost matrix is |d| X
                 let flow = self.a.scaled(&d).minus(&self.b.times(&k));
                 let stage = Exact::of(&weights.q).scaled(&d.square()).plus(&k.quadratic(&Exact::of(&weights.r)));
-                let (flow, sign) = if d.sign() < 0 { (flow.by(-1.0), -1.0) } else { (flow, 1.0) };
+                let flow = if d.sign() < 0 { flow.by(-1.0) } else { flow };
                 let (numerator, denominator) = lyapunov(&flow, &stage);
                 let numerator = numerator.by(f64::from(denominator.sign()));
                 let is_stable = denominator.sign() != 0 && numerator.is_positive();
@@ -259,7 +259,6 @@ impl Point {
                 // xᵀXx = form/(|denominator| |d|) against κ v/|d|
                 let cost = numerator.form(&x);
                 let bound = &(&v * &Dyadic::from(*factor)) * &denominator.abs();
-                let _ = sign;
                 is_said(
                     (&cost + &(&bound.abs() * &Dyadic::from(self.slack))).exceeds(&bound),
                     "the motion from the witness does not cost more",
@@ -307,8 +306,8 @@ pub fn check_premises(claims: &[Claim]) -> Result<(), String> {
     Ok(())
 }
 
-/// Every claim that is proved holds at these points, and what it rests on stands; every claim that is refuted is broken at its witness.
-/// Counts the witnesses.
+/// Every claim that is proved holds at these points, and what it rests on stands; every claim that is refuted is
+/// broken at its witness. Counts the witnesses.
 pub fn check(
     claims: &[Claim],
     bounds: &Bounds,

@@ -1,4 +1,5 @@
-//! Exact arithmetic on doubles: numbers m·2ᵉ with integers of any size, and matrices of them. Nothing here is shared with the prover.
+//! Exact arithmetic on doubles: numbers m·2ᵉ with integers of any size, and matrices of them. Nothing here is shared
+//! with the prover.
 
 use lpv::math::Mat;
 use num_bigint::{BigInt, Sign};
@@ -200,8 +201,8 @@ impl Exact {
         ((0..self.rows).map(|i| (0..self.columns).map(|j| integer(self.at(i, j))).collect()).collect(), e)
     }
 
-    /// Whether a symmetric matrix is positive definite: all leading minors are positive (Sylvester), which elimination without
-    /// fractions and without pivots gives one after the other.
+    /// Whether a symmetric matrix is positive definite: all leading minors are positive (Sylvester), which
+    /// elimination without fractions and without pivots gives one after the other.
     pub fn is_positive(&self) -> bool {
         let (mut m, _) = self.integers();
         let (n, zero) = (self.rows, BigInt::from(0));

@@ -1,8 +1,8 @@
 //! Flights of the saturated LPV loop from the edge of a proved set, against a parameter that moves as badly as it may.
 //!
-//! ẋ = A(ρ)x − B(ρ) sat(K(ρ)x), Runge–Kutta of fourth order; ρ̇ is chosen at every step among the extreme rates, so that V grows most
-//! (greedy). At every step: V̇ is not positive, V is not above what it was, inputs that are claimed to stay unsaturated do, and the
-//! cost so far is below its bound.
+//! ẋ = A(ρ)x − B(ρ) sat(K(ρ)x), Runge–Kutta of fourth order; ρ̇ is chosen at every step among the extreme rates, so
+//! that V grows most (greedy). At every step: V̇ is not positive, V is not above what it was, inputs that are claimed
+//! to stay unsaturated do, and the cost so far is below its bound.
 
 use lpv::math::Mat;
 use lpv::math::eigen::symmetric_eigenvectors;
@@ -31,6 +31,9 @@ impl Frozen {
     }
 }
 
+/// Where a parameter may be after a time, from where it is.
+pub type Moves<'a> = dyn Fn(&[f64], f64) -> Vec<Vec<f64>> + 'a;
+
 /// What is flown, and what is claimed of it.
 pub struct Flown<'a> {
     pub states: usize,
@@ -40,7 +43,7 @@ pub struct Flown<'a> {
     /// Where the parameter starts.
     pub start: Vec<f64>,
     /// Where it may be after a time, from where it is.
-    pub moves: &'a dyn Fn(&[f64], f64) -> Vec<Vec<f64>>,
+    pub moves: &'a Moves<'a>,
     /// sᵢ is in [−below, above], s = sat(Kx).
     pub below: Vec<f64>,
     pub above: Vec<f64>,
@@ -70,8 +73,8 @@ impl Flown<'_> {
         product(&at.k, &x[..n], &mut s);
         s.iter_mut().enumerate().for_each(|(i, s)| *s = s.clamp(-self.below[i], self.above[i]));
         product(&at.a, &x[..n], &mut slope[..n]);
-        for i in 0..n {
-            slope[i] -= (0..m).map(|j| at.b[i * m + j] * s[j]).sum::<f64>();
+        for (i, slope) in slope[..n].iter_mut().enumerate() {
+            *slope -= (0..m).map(|j| at.b[i * m + j] * s[j]).sum::<f64>();
         }
         slope[n] = self.cost.map_or(0.0, |(_, q, r)| {
             let form = |weight: &Mat<f64>, x: &[f64]| -> f64 {

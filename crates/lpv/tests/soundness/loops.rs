@@ -1,5 +1,5 @@
-//! Loops that are proved: a linear plant, one whose matrices are functions of a parameter, and polytopes; as what the prover takes, as exact
-//! points, and as numbers to fly.
+//! Loops that are proved: a linear plant, one whose matrices are functions of a parameter, and polytopes; as what the
+//! prover takes, as exact points, and as numbers to fly.
 
 use crate::conditions::Point;
 use crate::exact::{Dyadic, Exact};
@@ -286,7 +286,8 @@ impl Loop {
         (Mat::from_fn(n, n, |i, j| a[i * n + j]), Mat::from_fn(n, m, |i, j| b[i * m + j]))
     }
 
-    /// The loop at ρ; exactly where everything is a polynomial of ρ and the gain does not depend on it, else to a relative 10⁻⁹.
+    /// The loop at ρ; exactly where everything is a polynomial of ρ and the gain does not depend on it, else to a
+    /// relative 10⁻⁹.
     pub fn point(&self, rho: f64) -> Point {
         let (n, _) = self.sizes();
         let design = &self.design;

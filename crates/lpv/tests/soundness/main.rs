@@ -1,14 +1,16 @@
-//! The project's own attack on the word `proved`: thousands of generated loops, good, bad and at the edge, are given to the prover, and every
-//! verdict is held against exact arithmetic, against flights from the edge of each proved set, and against the motion of each witness.
+//! The project's own attack on the word `proved`: thousands of generated loops, good, bad and at the edge, are given
+//! to the prover, and every verdict is held against exact arithmetic, against flights from the edge of each proved
+//! set, and against the motion of each witness.
 //!
 //! ```text
 //! cargo test -p lpv --test soundness
 //! SOUNDNESS_REPLAY=linear:17 cargo test -p lpv --test soundness     # one case, with its claims
-//! SOUNDNESS_SHARE=0.1 cargo test -p lpv --test soundness            # a tenth of the cases, up to the first disagreement
+//! SOUNDNESS_SHARE=0.1 cargo test -p lpv --test soundness            # a tenth of the cases, up to the first
+//! disagreement
 //! ```
 //!
-//! Cases are numbered from 0, and a number gives the same case everywhere. The table counts claims by verdict; a case is `refused` where
-//! the door or the prover takes it for no design.
+//! Cases are numbered from 0, and a number gives the same case everywhere. The table counts claims by verdict; a case
+//! is `refused` where the door or the prover takes it for no design.
 
 mod conditions;
 mod exact;

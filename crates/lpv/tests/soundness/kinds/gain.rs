@@ -1,4 +1,5 @@
-//! The induced L2 norm: the inequality in exact arithmetic, and motions with disturbances that gain as much as they can.
+//! The induced L2 norm: the inequality in exact arithmetic, and motions with disturbances that gain as much as they
+//! can.
 
 use super::polynomials;
 use crate::Tally;

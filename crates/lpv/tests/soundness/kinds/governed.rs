@@ -1,5 +1,5 @@
-//! Governed references of chains of integrators whose matrices are wrong in one entry: what is claimed to be a motion of the model is one, up
-//! to what the set absorbs.
+//! Governed references of chains of integrators whose matrices are wrong in one entry: what is claimed to be a motion
+//! of the model is one, up to what the set absorbs.
 
 use crate::Tally;
 use crate::conditions::check_premises;
@@ -84,7 +84,8 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     Ok(())
 }
 
-/// Budget and limits together are within the actuators, exactly; and V falls on the edge of the set against what the reference leaves over.
+/// Budget and limits together are within the actuators, exactly; and V falls on the edge of the set against what the
+/// reference leaves over.
 fn is_a_motion(design: &Design, farthest: f64) -> Result<(), String> {
     let controller = &design.controller;
     let governor = controller.supervisor.as_ref().and_then(|s| s.governor.as_ref()).ok_or("no governor")?;
@@ -115,7 +116,7 @@ fn is_a_motion(design: &Design, farthest: f64) -> Result<(), String> {
         for (step, input) in motion.inputs.iter().enumerate() {
             let mut rest = &z[step] - &model.b * constant(input);
             if let Some(next) = z.get(step + 1) {
-                rest = rest - &model.a * next;
+                rest -= &model.a * next;
             }
             (0..n).for_each(|i| w[i] += peaks[step] * farthest * rest[(i, j)]);
         }

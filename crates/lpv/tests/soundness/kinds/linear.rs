@@ -13,7 +13,8 @@ use lpv::math::matrix::{diagonal, identity, quadratic_form, symmetric_part};
 use lpv::math::riccati;
 use lpv::synthesis::CostWeights;
 
-/// A regulator from the Riccati equation with P a little larger, a low gain near it, and for half of them a high gain on its segment.
+/// A regulator from the Riccati equation with P a little larger, a low gain near it, and for half of them a high gain
+/// on its segment.
 pub fn regulator(numbers: &mut Numbers, n: usize, m: usize, size: f64) -> Option<Linear> {
     let (a, b) = (numbers.matrix(n, n), numbers.matrix(n, m));
     let r: Vec<f64> = (0..m).map(|_| 10.0_f64.powf(numbers.next())).collect();

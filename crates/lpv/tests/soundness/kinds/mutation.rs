@@ -1,5 +1,5 @@
-//! Good designs with one thing wrong: an entry, a sign, inputs exchanged, a limit shorter or gone, a level scaled, the last digit of one of two
-//! entries that should agree, and numbers at the ends of the range of doubles.
+//! Good designs with one thing wrong: an entry, a sign, inputs exchanged, a limit shorter or gone, a level scaled,
+//! the last digit of one of two entries that should agree, and numbers at the ends of the range of doubles.
 
 use super::family;
 use super::linear::{examine, regulator};
@@ -97,7 +97,8 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     tally.refused += usize::from(refused);
     let is_read = !matrices.into_iter().all(is_finite);
     if is_read || linear.f.as_ref().is_some_and(|f| !is_finite(f)) {
-        // the door refuses it; behind the door nothing comes of it that needs the number (F is not read where nothing is limited)
+        // the door refuses it; behind the door nothing comes of it that needs the number (F is not read where nothing
+        // is limited)
         let claims = prove(&of.design, &*of.plant, &Default::default()).map_or(Vec::new(), |proofs| proofs.claims);
         tally.count(&claims);
         let all = !claims.is_empty() && claims.iter().all(|claim| claim.verdict == Verdict::Proved);

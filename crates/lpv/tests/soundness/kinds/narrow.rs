@@ -1,5 +1,5 @@
-//! Claims that fail on a narrow interval of the parameter only, away from the middles of cells and from grid points, or by next to nothing
-//! not at all.
+//! Claims that fail on a narrow interval of the parameter only, away from the middles of cells and from grid points,
+//! or by next to nothing not at all.
 
 use super::attack;
 use crate::Tally;
@@ -33,7 +33,7 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     let mut weights = CostWeights { q: identity(1), r: identity(1) };
     let (mut y, mut limits, mut gamma) = ([1.0, 0.0, 0.0], InputLimits::none(1), None);
     let a;
-    match numbers.below(5) {
+    match numbers.below(6) {
         // the decrease is 2(k − a)y
         0 => a = valley(-c, at, w, k),
         // with the parameter's motion: 2(k − a)y ± r y′
@@ -43,6 +43,12 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
             // 2(k − a) = r|y′| + c((ρ − ρ₀)² − w), but for y, which is 1 at most of the places: there it fails or not
             y[0] -= slope * at;
             a = valley(-0.5 * c, at, w, k - 0.5 * rate * slope.abs());
+        }
+        // a hump that comes down to next to nothing, or below, at one end of the range
+        5 => {
+            let end = numbers.of(&[1.0, -1.0]);
+            let from = -end * at.abs();
+            a = valley(c, from, (end - from) * (end - from) - w, k);
         }
         // y itself
         2 => {
@@ -87,10 +93,5 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     };
     let constant = |value: f64| MatrixFunction::constant(Mat::from_fn(1, 1, |_, _| value));
     let of = scheduled.build(Family::new(basis(a), constant(1.0), [-1.0, 1.0], false));
-    attack(numbers, tally, &of, &ProofOptions::default(), &[at, -1.0, 1.0, numbers_near(at)]).map(|_| ())
-}
-
-/// Another place, for flights.
-fn numbers_near(at: f64) -> f64 {
-    (at + 0.125).min(1.0)
+    attack(numbers, tally, &of, &ProofOptions::default(), &[at, -1.0, 1.0, (at + 0.125).min(1.0)]).map(|_| ())
 }

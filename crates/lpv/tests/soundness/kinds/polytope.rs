@@ -92,11 +92,15 @@ pub fn generate(numbers: &mut Numbers) -> Option<PolytopicClaim> {
     })
 }
 
-/// Two vertices whose inputs act in opposite directions, with gains to match: halfway no input acts, and a alone is left.
+/// Two vertices whose inputs act in opposite directions, with gains to match: halfway no input acts, and a alone is
+/// left.
 fn opposed(numbers: &mut Numbers) -> Option<PolytopicClaim> {
     let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
     let [b, k, p] = [0, 1, 2].map(|_| 0.5 + numbers.unit());
     let weights = CostWeights { q: scalar(1.0), r: scalar(0.25) };
+    if numbers.once_in(2) {
+        return tight_between(numbers, [b, k, p], weights);
+    }
     // the decrease halfway is −2pa, and the cost asks for q
     let a = match numbers.below(2) {
         0 => -(1.5 * numbers.unit()) / (2.0 * p),
@@ -112,6 +116,20 @@ fn opposed(numbers: &mut Numbers) -> Option<PolytopicClaim> {
             rate_vertices: vec![vec![1.0, -1.0], vec![-1.0, 1.0]],
         },
     };
+    Some(PolytopicClaim { polytope, lyapunov, auxiliary_gain: None, weights: Some(weights), saturation: None })
+}
+
+/// Two vertices at which the cost is just below its bound, and halfway it is just below or above it: with b ± d and k
+/// ± e the conditions of the vertices are δ each, and that of the pair is 2δ − (8pde − 2re²).
+fn tight_between(numbers: &mut Numbers, [b, k, p]: [f64; 3], weights: CostWeights) -> Option<PolytopicClaim> {
+    let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+    let (q, r) = (weights.q[(0, 0)], weights.r[(0, 0)]);
+    let (delta, e) = (0.02 * q, 0.1 + 0.2 * numbers.unit());
+    let d = (q * numbers.unit() + 2.0 * r * e * e) / (8.0 * p * e);
+    let vertices = [(b + d, k + e), (b - d, k - e)];
+    let a = vertices.map(|(b, k)| scalar(b * k - (q + r * k * k + delta) / (2.0 * p)));
+    let polytope = Polytope::new(a.to_vec(), vertices.map(|(b, _)| scalar(b)).to_vec()).ok()?;
+    let lyapunov = PolytopicLyapunov::Common { p: scalar(p), gain: vertices.map(|(_, k)| scalar(k)).to_vec() };
     Some(PolytopicClaim { polytope, lyapunov, auxiliary_gain: None, weights: Some(weights), saturation: None })
 }
 

@@ -1,5 +1,5 @@
-//! Sampled loops of chains of integrators, whose zero-order hold is a polynomial: exactly stable or not; and with saturation, from
-//! samples at the edge of the set.
+//! Sampled loops of chains of integrators, whose zero-order hold is a polynomial: exactly stable or not; and with
+//! saturation, from samples at the edge of the set.
 
 use super::attack;
 use super::linear::{sampled, sampled_exactly};
@@ -74,7 +74,8 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     Ok(())
 }
 
-/// ẋ = ax + bu, u = −kx held for T: x₊ = (e^{aT} − bk(e^{aT} − 1)/a)x, at the edge −1 or near it; exactly on it where a = 0.
+/// ẋ = ax + bu, u = −kx held for T: x₊ = (e^{aT} − bk(e^{aT} − 1)/a)x, at the edge −1 or near it; exactly on it where
+/// a = 0.
 fn of_the_first_order(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     let scalar = |value: f64| Mat::from_fn(1, 1, |_, _| value);
     let (a, b) = (numbers.of(&[0.0, 1.0, -1.0]) * (0.2 + numbers.unit()), 0.5 + numbers.unit());

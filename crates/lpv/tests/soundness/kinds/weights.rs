@@ -1,5 +1,5 @@
-//! Weights of small integers, singular and indefinite ones among them; matrices that differ from symmetric ones by one unit in the last
-//! place.
+//! Weights of small integers, singular and indefinite ones among them; matrices that differ from symmetric ones by
+//! one unit in the last place.
 
 use crate::Tally;
 use crate::conditions::{Bounds, check};
@@ -47,7 +47,7 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
     tally.count(&claims);
     let bounds = Bounds::of_sigma(&vec![f64::INFINITY; m], claim.weights.as_ref());
     let point = polytope_point(&claim, &[1.0], None);
-    tally.witnesses += check(&claims, &bounds, &[point.clone()], &|_| point.clone())?;
+    tally.witnesses += check(&claims, &bounds, std::slice::from_ref(&point), &|_| point.clone())?;
     // exact elimination with pivots against principal minors
     for matrix in [&q, &r] {
         let exact = crate::exact::Exact::of(matrix);
