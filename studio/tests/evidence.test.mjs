@@ -206,12 +206,14 @@ describe("the fixture", LIMIT, () => {
 
   test("a bound names what it bounds, and says what it does not cover", async () => {
     const report = makeReport({ duration_s: 2 });
-    const [flown, model] = report.runs;
+    const [flown, model, plant] = report.runs;
+    Object.assign(plant, { guaranteed_cost: null, plant_cost_bound: 0.02, model_cost_bound: null, actual_cost: 0.019, guaranteed_cost_verdict: "proved" });
     Object.assign(flown, { guaranteed_cost: flown.actual_cost * 1.5, model_cost_bound: null, guaranteed_cost_of: "plant", guaranteed_cost_verdict: "proved" });
     Object.assign(model, { guaranteed_cost: null, model_cost_bound: 1.3, actual_cost: 1.3595, guaranteed_cost_verdict: "numerical" });
     await open("evidence-bounds", report, async (page) => {
       const bound = (run) => rowOf(page, run).locator(".col-bound");
-      assert.doesNotMatch(await bound(flown).innerText(), /model/);
+      assert.doesNotMatch(await bound(flown).innerText(), /model|continuous/);
+      assert.match(await bound(plant).innerText(), /≤ 0\.02\s+of the plant in continuous time/);
       assert.match(await bound(flown).innerText(), /proved/);
       assert.match(await bound(model).innerText(), /≤ 1\.3\s+of the model/);
       assert.match(await bound(model).locator("[title]").first().getAttribute("title"), /does not cover what linearisation leaves out .* sampled/);

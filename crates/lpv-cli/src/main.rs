@@ -1,10 +1,11 @@
 //! The program `lpv`: from a nonlinear plant to a checked gain-scheduled controller and its flight.
 //!
 //! Each subcommand is a file; what several share is beside them:
-//! `scenario`, `problem` and `tp` read TOML, `designs` runs synthesis and checks, `flights` simulates, `report` and `record` write results,
+//! `scenario`, `problem` and `tp` read TOML, `designs` runs synthesis and checks, `flights` simulates, `contradiction` holds flights against what is proved, `report` and `record` write results,
 //! `table` lays them out, `output` prints, `folder` keeps results whole, `failure` is every way to end that is not success.
 
 mod certify;
+mod contradiction;
 mod design;
 mod designs;
 mod failure;

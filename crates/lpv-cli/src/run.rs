@@ -1,5 +1,6 @@
 //! `lpv run`: design → check → fly → report.
 
+use crate::contradiction;
 use crate::designs::{self, CheckedDesign};
 use crate::failure::Failure;
 use crate::flights::{self, Certified};
@@ -73,7 +74,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         ))?;
     }
     let replay = format!("lpv run {} --force", arguments.scenario.display());
-    flights::no_contradiction(&scenario, &flown, &replay)?;
+    contradiction::no_contradiction(&scenario, &flown, &replay)?;
     required_verdicts(&scenario, &checked)
 }
 

@@ -1,5 +1,6 @@
 //! `lpv simulate`: the closed loop alone, with designs from files.
 
+use crate::contradiction;
 use crate::designs;
 use crate::failure::Failure;
 use crate::flights::{self, Certified, Flown};
@@ -99,7 +100,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         print(&place.display().to_string())?;
     }
     let replay = format!("lpv simulate {} --designs {} --force", arguments.scenario.display(), source.display());
-    flights::no_contradiction(&scenario, &flown, &replay)
+    contradiction::no_contradiction(&scenario, &flown, &replay)
 }
 
 fn summary<'a>(name: &'a str, flown: &'a Flown) -> FlightSummary<'a> {
