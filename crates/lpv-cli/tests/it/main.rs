@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod mutated;
+mod polytopes;
 mod problems;
 mod program;
 mod run;

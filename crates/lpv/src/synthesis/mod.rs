@@ -42,7 +42,6 @@ pub use region::covering_level;
 pub use supervision::{GovernorOptions, Supervision, SupervisionError, design_supervised, governed_states, governor};
 pub use validation::DesignError;
 
-
 /// Why there is no design.
 #[derive(Debug, thiserror::Error)]
 pub enum SynthesisError {

@@ -108,7 +108,7 @@ pub struct PolytopicDesign {
     pub separation: Option<Separation>,
     /// A motion that costs nothing and does not decay, of one vertex, which is proved.
     pub undetectable: Option<Mode>,
-    /// Where the solver stopped short and the answer's blocks and objective are those of the Riccati solution, made strict by this ε
+    /// Where the answer's blocks and objective are those of the Riccati solution, made strict by this ε
     /// ([`crate::math::riccati::strict`]): they are proved at it, and it is the solution.
     pub riccati: Option<f64>,
     /// Y, L and gains where the problem was solved, and at the best point so far where the solver stopped short.
@@ -386,10 +386,11 @@ fn regulate(
         }
         seems_unstabilizable = stabilization.unstabilizable;
     }
-    let is_riccati =
-        polytope.len() == 1 && request.saturation.is_none() && matches!(request.objective, Objective::Trace);
+    // the least cost from every state at once, so that there is an optimum, which is attained
+    let is_regulator = polytope.len() == 1 && request.saturation.is_none();
+    let is_riccati = is_regulator && matches!(request.objective, Objective::Trace);
     let mut undetectable = None;
-    if is_riccati && !answer.outcome.is_feasible() {
+    if is_riccati {
         match riccati::solve(polytope.a(0), polytope.b(0), &cost.q, &cost.r) {
             Ok(regulator) => {
                 if let Some(design) = by_riccati(polytope, cost, &problem, &answer, &regulator)? {
@@ -416,8 +417,7 @@ fn regulate(
         q: inverse_spd(&cost.q).map(|_| &cost.q),
         ladder: &COST_LADDER,
     };
-    // the optimum of one vertex without limits is the Riccati solution, which is attained
-    let is_attained = is_riccati && answer.outcome.is_feasible();
+    let is_attained = is_regulator && answer.outcome.is_feasible();
     let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
     let moderated = stage.moderate(answer, back_off, &solver())?;
     let shrink = moderated.shrink;
@@ -472,8 +472,8 @@ struct Strict {
     blocks: Vec<BlockReport>,
 }
 
-/// Theorem 2.1 by the Riccati equation, where the solver stopped short of its optimum: the P of least ε that is proved to satisfy the
-/// inequalities of `problem`. With an unobserved motion that decays the optimum is not attained; the gain is that of the optimum all the same.
+/// Theorem 2.1 by the Riccati equation, whose gain is right to rounding where the solver's has half the digits of its gap: the P of least ε
+/// that is proved to satisfy the inequalities of `problem`. With an unobserved motion that decays the optimum is not attained; the gain is that of the optimum all the same.
 fn by_riccati(
     polytope: &Polytope,
     cost: &CostWeights,

@@ -1,0 +1,119 @@
+//! Random polytopes whose truth another solver found: every feasible one gets a design that is proved and that one can apply, every other
+//! one is called infeasible, with every method.
+
+use crate::program::Place;
+use lpv::math::eigen::symmetric_eigenvalues;
+use lpv::math::matrix::from_rows;
+use serde::Deserialize;
+use serde_json::Value;
+
+const POLYTOPES: &str = include_str!("../cases/polytopes/polytopes.json");
+
+#[derive(Deserialize)]
+struct Polytope {
+    #[serde(rename = "A")]
+    a: Value,
+    #[serde(rename = "B")]
+    b: Vec<Vec<f64>>,
+    feasible: Option<bool>,
+    #[serde(rename = "tr_Y")]
+    trace: Option<f64>,
+    gain_at_90_percent: Option<f64>,
+}
+
+impl Polytope {
+    fn problem(&self, method: &str) -> String {
+        let (n, m) = (self.b.len(), self.b[0].len());
+        let ones = |count: usize| format!("{:?}", vec![1.0; count]);
+        let weights = match method {
+            "stabilize" => String::new(),
+            _ => format!("[weights]\nQ_diag = {}\nR_diag = {}\n", ones(n), ones(m)),
+        };
+        let limits = format!("method = \"slpvqr\"\nsigma = {}\ngamma = 1\n", ones(m));
+        let method = match method {
+            "slpvqr" => limits,
+            "high-gain" => limits + "high_gain = true\n",
+            other => format!("method = \"{other}\"\n"),
+        };
+        format!("[model]\nA = {}\nB = {:?}\n{weights}[design]\nlyapunov = \"common\"\n{method}", self.a, self.b)
+    }
+
+    /// Why the answer of `method` is of no use; `None` if it is.
+    fn complaint(&self, method: &str) -> Option<String> {
+        let place = Place::with(self.problem(method));
+        let ended = place.lpv("design scenario.toml -o design.json");
+        if self.feasible != Some(true) {
+            return (self.feasible == Some(false) && ended.code != 3).then_some(ended.err);
+        }
+        if ended.code != 0 {
+            return Some(ended.err);
+        }
+        let design = place.json("design.json");
+        let certificate: Value = serde_json::from_str(&place.succeed("certify design.json --json")).unwrap();
+        let matrices: Vec<Vec<Vec<f64>>> = serde_json::from_value(design["K"].clone()).unwrap();
+        let gain = |k: &Vec<Vec<f64>>| {
+            let k = from_rows(k);
+            symmetric_eigenvalues(&(&k * k.transpose())).into_iter().fold(0.0, f64::max).sqrt()
+        };
+        let gain = matrices.iter().map(gain).fold(0.0, f64::max);
+        let most = if method == "lpvqr" { 5.0 * self.gain_at_90_percent.unwrap() } else { 1e4 };
+        let achieved = design["achieved"].as_f64().unwrap();
+        let least = if method == "lpvqr" { 0.8 * self.trace.unwrap() } else { 0.0 };
+        let proved = certificate["verdict"] == "proved" && design["verdict"] == "proved";
+        (!proved || gain > most || achieved < least)
+            .then(|| format!("proved {proved}, gain {gain:e} of {most:e}, objective {achieved} of {least}"))
+    }
+}
+
+/// 88 are feasible and 12 are not.
+#[test]
+fn every_polytope_is_designed_or_refuted() {
+    let polytopes: Vec<Polytope> = serde_json::from_str(POLYTOPES).unwrap();
+    let count = |feasible| polytopes.iter().filter(|polytope| polytope.feasible == Some(feasible)).count();
+    assert_eq!((count(true), count(false)), (88, 12));
+    let methods = ["lpvqr", "slpvqr", "high-gain", "stabilize"];
+    std::thread::scope(|scope| {
+        let each = |method: &'static str| {
+            let polytopes = &polytopes;
+            scope.spawn(move || {
+                let complaints = polytopes.iter().enumerate().filter_map(|(i, polytope)| {
+                    polytope.complaint(method).map(|complaint| format!("{method}, polytope {i}: {complaint}"))
+                });
+                complaints.collect::<Vec<_>>()
+            })
+        };
+        let threads = methods.map(each);
+        let complaints: Vec<String> = threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect();
+        assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+    });
+}
+
+/// What is given back is said, and can be chosen.
+#[test]
+fn back_off() {
+    let polytopes: Vec<Polytope> = serde_json::from_str(POLYTOPES).unwrap();
+    let text = polytopes[0].problem("lpvqr");
+    let answer = |back_off: &str| -> Value {
+        let place = Place::with(format!("{text}{back_off}"));
+        serde_json::from_str(&place.succeed("design scenario.toml --json")).unwrap()
+    };
+    let number = |answer: &Value, key: &str| answer[key].as_f64().unwrap();
+    let knee = answer("");
+    assert!(number(&knee, "back_off") > 0.0 && number(&knee, "largest_gain") < 100.0, "{knee}");
+    let shares = ["back_off = 0.01\n", "back_off = 0.1\n", "back_off = 0.3\n"].map(answer);
+    for (answer, share) in shares.iter().zip([0.01, 0.1, 0.3]) {
+        let (optimum, achieved) = (number(answer, "objective"), number(answer, "achieved"));
+        assert!(achieved >= (1.0 - share) * optimum * (1.0 - 1e-5) && achieved <= optimum, "{achieved} of {optimum}");
+        assert!((optimum / number(&knee, "objective") - 1.0).abs() < 1e-9, "the optimum is the same");
+    }
+    assert!(number(&shares[2], "largest_gain") < number(&shares[0], "largest_gain"));
+    // the bare optimum is not attained, and no gain of it can be applied
+    Place::with(format!("{text}back_off = 0\n"))
+        .lpv("design scenario.toml")
+        .refuses(4, &["cannot be proved", "give more of the optimum back"]);
+    for bad in ["-0.1", "1", "nan", "1e-9"] {
+        Place::with(format!("{text}back_off = {bad}\n"))
+            .lpv("design scenario.toml")
+            .refuses(2, &["design.back_off", "a share of the optimum"]);
+    }
+}
