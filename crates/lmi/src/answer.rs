@@ -19,7 +19,8 @@ pub enum Outcome {
     /// |p − d| / (1 + |p| + |d|) ≤ 10⁻⁵.
     /// ```
     ///
-    /// The solver's own estimate of this gap is at most 10⁻⁷ ([`Residuals::gap`]; what [`Options::back_off`](crate::Options::back_off) gives up comes on top).
+    /// The solver's own estimate of this gap is at most 10⁻⁷ ([`Residuals::gap`]; what
+    /// [`Options::back_off`](crate::Options::back_off) gives up comes on top).
     Solved,
     /// Optimal up to rounding; what is missing to `Solved` is said by [`Tolerance`]. So end problems without interior, such as those with equations as
     /// pairs of inequalities: whether a feasible point exists at all is then not known.

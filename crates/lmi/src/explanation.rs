@@ -60,7 +60,8 @@ impl fmt::Display for Explanation {
 }
 
 impl Problem {
-    /// Explains an answer that is [`Outcome::Infeasible`] or [`Outcome::InfeasibleWithin`]; `None` for every other one, and where the least relaxation cannot be found.
+    /// Explains an answer that is [`Outcome::Infeasible`] or [`Outcome::InfeasibleWithin`]; `None` for every other one, and
+    /// where the least relaxation cannot be found.
     ///
     /// Solves the problem anew with its inequalities relaxed, all together and then one by one.
     ///

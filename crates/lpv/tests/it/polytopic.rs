@@ -1,7 +1,6 @@
 //! Synthesis over polytopes: against other solvers, the thesis's corrected numbers, and the inequalities' own meaning.
 
 use crate::quadrotor::{plant, weights as quadrotor_weights};
-use lmi::Outcome;
 use lpv::math::Mat;
 use lpv::math::eigen::{smallest_eigenvalue, spectral_abscissa};
 use lpv::math::matrix::{diagonal, from_rows, quadratic_form};
@@ -45,7 +44,8 @@ fn double_integrator() -> (Polytope, CostWeights) {
 
 fn solved(polytope: &Polytope, request: &PolytopicRequest) -> PolytopicDesign {
     let design = synthesize(polytope, request).unwrap();
-    assert!(matches!(design.answer.outcome, Outcome::Solved), "{:?}", design.answer.outcome);
+    // L may grow without end where it costs nothing: then no bound on the optimum holds for every L.
+    assert!(design.answer.outcome.is_feasible(), "{:?}", design.answer.outcome);
     assert!(design.answer.blocks.iter().all(|block| block.verified_lower_bound > -1e-9));
     design
 }
