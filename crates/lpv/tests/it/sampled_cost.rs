@@ -186,13 +186,14 @@ fn several_inputs_of_which_some_are_limited() {
     };
     let weights = CostWeights { q: identity(3), r: from_rows(&[vec![0.2, 0.05], vec![0.05, 0.1]]) };
     let high = Method::HighGainSlpvqr { gamma: 3.0, high_gain: HIGH_GAIN };
-    for limits in [
-        InputLimits { min: vec![Some(-1.0), Some(-2.0)], max: vec![Some(2.0), Some(1.0)] },
-        InputLimits { min: vec![Some(-1.0), None], max: vec![Some(1.0), None] },
+    // the saturated methods ask for limits of every input
+    for (method, limits) in [
+        (high, InputLimits { min: vec![Some(-1.0), Some(-2.0)], max: vec![Some(2.0), Some(1.0)] }),
+        (Method::Lpvqr, InputLimits { min: vec![Some(-1.0), None], max: vec![Some(1.0), None] }),
     ] {
         // one input at its limit and the other at a high gain: not every sample time is short enough for that
         let of = |sample_time_s: f64| {
-            let case = Case::new(spec(), high, limits.clone(), weights.clone(), sample_time_s);
+            let case = Case::new(spec(), method, limits.clone(), weights.clone(), sample_time_s);
             let proved = case.proved();
             proved.factor.map(|factor| (case, factor, proved.level))
         };
