@@ -223,10 +223,9 @@ pub fn step_bound(design: &Design, plant: &dyn Plant, bases: &[BoundBasis], step
     let share = level.map(|level| (Interval::from(value) / level).hi());
 
     let (limits, input) = (&design.controller.limits, &design.controller.operating_input);
-    let leaves = |i: &usize| {
-        limits.min[*i].is_some_and(|min| !(min <= input[*i])) || limits.max[*i].is_some_and(|max| !(input[*i] <= max))
-    };
-    let outside_limits = (0..input.len()).find(leaves).map(|input| UnmetCondition::InputOutside { input });
+    let is_held =
+        |i: usize| limits.min[i].is_none_or(|min| min <= input[i]) && limits.max[i].is_none_or(|max| input[i] <= max);
+    let outside_limits = (0..input.len()).find(|&i| !is_held(i)).map(|input| UnmetCondition::InputOutside { input });
     let reference = unrest(plant, step.reference, input).map(|unrest| match unrest {
         Unrest::Moves { state, rate } => UnmetCondition::ReferenceMoves { state, rate },
         Unrest::Elsewhere => UnmetCondition::ReferenceElsewhere,
