@@ -5,8 +5,7 @@
 //! ```text
 //! cargo test -p lpv --test soundness
 //! SOUNDNESS_REPLAY=linear:17 cargo test -p lpv --test soundness     # one case, with its claims
-//! SOUNDNESS_SHARE=0.1 cargo test -p lpv --test soundness            # a tenth of the cases, up to the first
-//! disagreement
+//! SOUNDNESS_SHARE=0.1 cargo test -p lpv --test soundness            # a tenth, up to the first disagreement
 //! ```
 //!
 //! Cases are numbered from 0, and a number gives the same case everywhere. The table counts claims by verdict; a case
