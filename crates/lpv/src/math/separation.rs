@@ -174,6 +174,7 @@ fn repaired(reached: &[Integers], free: &[usize], guess: &[Mat<f64>]) -> Option<
 mod tests {
     use super::*;
     use crate::math::matrix::{diagonal, from_rows};
+    use std::slice::from_ref;
 
     /// ẋ₁ = ±x₂ + …, ẋ₂ = u: x₁ is driven by x₂ with either sign, and no common function exists. With the same sign there is one.
     #[test]
@@ -205,10 +206,10 @@ mod tests {
     fn edges() {
         let one = Mat::from_fn(1, 1, |_, _| 1.0);
         let none = Mat::zeros(1, 1);
-        assert_eq!(separating(&[&one], &one, &[one.clone()]), None);
-        assert!(separating(&[&one], &none, &[one.clone()]).is_some(), "ẋ = x without an input");
-        assert_eq!(separating(&[&(-1.0 * &one)], &none, &[one.clone()]), None);
-        assert_eq!(separating(&[&one], &none, &[none.clone()]), None, "zero separates nothing");
+        assert_eq!(separating(&[&one], &one, from_ref(&one)), None);
+        assert!(separating(&[&one], &none, from_ref(&one)).is_some(), "ẋ = x without an input");
+        assert_eq!(separating(&[&(-1.0 * &one)], &none, from_ref(&one)), None);
+        assert_eq!(separating(&[&one], &none, from_ref(&none)), None, "zero separates nothing");
         assert_eq!(separating(&[&one], &none, &[-1.0 * &one]), None);
         assert_eq!(separating(&[&one], &none, &[Mat::from_fn(1, 1, |_, _| f64::NAN)]), None);
         assert_eq!(separating(&[&one], &none, &[]), None);
