@@ -40,7 +40,7 @@ pub struct Report {
     objective: Option<f64>,
     /// What `objective` is.
     objective_is: &'static str,
-    /// The objective of the design that is returned, where a part of the optimum was given back.
+    /// The objective of the design that is returned; below the optimum where a part of it was given back.
     #[serde(skip_serializing_if = "Option::is_none")]
     achieved: Option<f64>,
     /// The share of the optimum that was given back for a smaller gain, at most; 0: nothing.
@@ -295,10 +295,7 @@ fn report(
         },
         objective: solutions.as_ref().and(objective),
         objective_is,
-        achieved: solutions
-            .as_ref()
-            .filter(|_| !moderations.is_empty())
-            .and_then(|_| self::objective(plan, designs, &PolytopicDesign::achieved).0),
+        achieved: solutions.as_ref().and_then(|_| self::objective(plan, designs, &PolytopicDesign::achieved).0),
         back_off: moderations.iter().map(|moderation| moderation.back_off).reduce(f64::max),
         optimum_is_attained: (!moderations.is_empty())
             .then(|| moderations.iter().all(|moderation| moderation.is_attained)),

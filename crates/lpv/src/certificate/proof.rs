@@ -282,7 +282,9 @@ impl Proofs {
     /// Whether the claim counts in the verdict on the design: all that the design, or the caller, claims. What is looked for beyond that
     /// is a finding, and counts if it is proved.
     pub fn is_counted(&self, claim: &Claim) -> bool {
-        let is_decided = matches!(claim.verdict, Verdict::Proved | Verdict::Refuted);
+        // that a set found between grid points is not kept by the sampled loop takes nothing from a design that does not claim it
+        let is_found = matches!(claim.kind, ClaimKind::SampledInvariance { .. });
+        let is_decided = claim.verdict == Verdict::Proved || claim.verdict == Verdict::Refuted && !is_found;
         // a factor is looked for, none is claimed
         let is_asked = self.asked && !matches!(claim.kind, ClaimKind::SampledCost { .. });
         is_asked || is_decided || matches!(claim.kind, ClaimKind::AsAsked { .. })
