@@ -57,8 +57,15 @@ fn certify_checks_every_saved_design() {
             assert!(text.contains(": numerical\n") || text.contains(": proved\n"), "{text}");
             let certificate = parsed(&place.succeed(&format!("certify designs/{file} --json")));
             let claims = certificate["claims"].as_array().unwrap();
+            // of a frozen design the set between its few grid points is looked for, and the sampled loop may be seen to leave it
+            let is_found = |claim: &Value| claim["kind"] == "sampled-invariance" && claim["verdict"] == "refuted";
             assert!(
-                claims.iter().all(|claim| claim["verdict"] == "undecided" || claim["margin"].as_f64().unwrap() > 0.0)
+                claims.iter().all(|claim| {
+                    claim["verdict"] == "undecided"
+                        || claim["margin"].as_f64().is_some_and(|margin| margin > 0.0)
+                        || is_found(claim)
+                }),
+                "{claims:?}"
             );
         }
     }
