@@ -26,6 +26,8 @@ type Rows = Vec<Vec<f64>>;
 
 /// The word for a design that is one.
 const SOLVED: &str = "solved";
+/// The word where nothing is known.
+const INACCURATE: &str = "inaccurate";
 
 /// What `lpv design PROBLEM.toml --json` prints.
 #[derive(Serialize)]
@@ -163,18 +165,19 @@ pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
         let mut report = solve_with(plan, path, back_off)?;
         iterations += report.iterations;
         // a file that our own door refuses has numbers that rounding got the better of
-        let claims = match report.status {
-            SOLVED => claims(&report, path).unwrap_or_default(),
-            _ => Vec::new(),
-        };
+        let has_gain = report.status == SOLVED || report.status == INACCURATE && report.k.is_some();
+        let claims = if has_gain { claims(&report, path).unwrap_or_default() } else { Vec::new() };
+        report.take_what_is_proved(plan, &claims);
         report.iterations = iterations;
         report.seconds = started.elapsed().as_secs_f64();
         if report.status != SOLVED || report.is_proved_by(plan, &claims) {
-            return Ok(first.filter(|_| report.status != SOLVED).unwrap_or(report));
+            let answer = first.filter(|_| report.status != SOLVED).unwrap_or(report);
+            return Ok(answer.without_unproved_gain());
         }
         first.get_or_insert(report);
     }
-    first.ok_or_else(|| Failure::Defect("no back-off was tried".into()))
+    let first = first.ok_or_else(|| Failure::Defect("no back-off was tried".into()))?;
+    Ok(first.without_unproved_gain())
 }
 
 /// What `lpv certify` says of the report as a file.
@@ -403,6 +406,27 @@ fn witness(design: &PolytopicDesign) -> Option<Vec<NamedMultiplier>> {
 }
 
 impl Report {
+    /// Of a solver that stopped short what it came to is a design all the same where every one of its `claims` is proved.
+    fn take_what_is_proved(&mut self, plan: &ProblemPlan, claims: &[Claim]) {
+        let is_single = matches!(plan.scope, Scope::Polytope(_)) || plan.models.len() == 1;
+        let is_proved = !claims.is_empty() && worst(claims) == Verdict::Proved;
+        if self.status == INACCURATE && is_proved && is_single && self.inside_certified_set != Some(false) {
+            (self.status, self.verdict, self.optimum_is_attained) = (SOLVED, Verdict::Proved, Some(false));
+            self.verdict_reason =
+                "every claim of lpv certify about K and P as they are printed; the solver stopped short of the optimum"
+                    .into();
+        }
+    }
+
+    /// No gain is shown as if it were an answer.
+    fn without_unproved_gain(mut self) -> Self {
+        if self.status != SOLVED {
+            (self.y, self.p, self.l, self.k, self.f) = (None, None, None, None, None);
+            (self.s, self.achieved, self.largest_gain, self.guaranteed_cost) = (None, None, None, None);
+        }
+        self
+    }
+
     /// Take the verdict from the `claims` about the file; whether all of them are proved. What is not is no solution.
     fn is_proved_by(&mut self, plan: &ProblemPlan, claims: &[Claim]) -> bool {
         if !claims.is_empty() && worst(claims) == Verdict::Proved {
@@ -417,7 +441,7 @@ impl Report {
         }
         let open = claims.iter().find(|claim| claim.verdict != Verdict::Proved);
         let open = open.map_or(String::new(), |claim| format!(": \"{}\" is {}", claim.claim, claim.verdict.word()));
-        self.status = "inaccurate";
+        self.status = INACCURATE;
         self.verdict = Verdict::Undecided;
         let remedy = match plan.back_off {
             BackOff::Knee => "weights, limits or units of less different size may help",

@@ -4,6 +4,7 @@ use super::door::Door;
 use super::file::{Diagonal, Rows};
 use crate::failure::Failure;
 use lpv::math::Mat;
+use lpv::math::definite::{Definiteness, definiteness};
 use lpv::math::eigen::smallest_eigenvalue;
 use lpv::math::matrix::{diagonal, from_rows, inverse_spd, is_finite, is_symmetric};
 
@@ -34,7 +35,12 @@ pub(crate) fn semidefinite(
 ) -> Result<Mat<f64>, Failure> {
     let (key, matrix) = square(door, key, rows, diag, size)?;
     let least = smallest_eigenvalue(&matrix);
-    match least >= -1e-12 * matrix.norm_max() {
+    // a certificate reads the numbers as they are, and so does the door
+    let is_semidefinite = match definiteness(&matrix) {
+        Some(definiteness) => definiteness != Definiteness::Indefinite,
+        None => least >= -1e-12 * matrix.norm_max(),
+    };
+    match is_semidefinite {
         true => Ok(matrix),
         false => door.refuse(
             key,

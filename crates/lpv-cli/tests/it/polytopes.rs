@@ -117,3 +117,24 @@ fn back_off() {
             .refuses(2, &["design.back_off", "a share of the optimum"]);
     }
 }
+
+/// As many inputs as states: any decay can be had, and a moderate one is taken.
+#[test]
+fn an_input_for_every_state() {
+    for (a, b) in [("[[1]]", "[[1]]"), ("[[0]]", "[[-2]]"), ("[[1, 2], [3, 4]]", "[[1, 0], [0.5, 1]]")] {
+        let place = Place::with(format!("[model]\nA = {a}\nB = {b}\n[design]\nmethod = \"stabilize\"\n"));
+        let answer: Value = serde_json::from_str(&place.succeed("design scenario.toml --json")).unwrap();
+        assert_eq!((&answer["status"], &answer["verdict"]), (&"solved".into(), &"proved".into()), "{answer}");
+        assert!(answer["largest_gain"].as_f64().unwrap() < 100.0, "{answer}");
+    }
+}
+
+/// What cannot be proved shows no gain.
+#[test]
+fn no_gain_without_a_proof() {
+    let text = "[model]\nA = [[1, 1e-300], [0, -1]]\nB = [[0], [1]]\n[design]\nmethod = \"stabilize\"\n";
+    let ended = Place::with(text).lpv("design scenario.toml --json");
+    let answer: Value = serde_json::from_str(&ended.out).unwrap();
+    assert_eq!((ended.code, &answer["status"]), (4, &"inaccurate".into()));
+    assert!(["K", "P", "Y", "L"].iter().all(|key| answer[*key].is_null()), "{answer}");
+}

@@ -198,6 +198,7 @@ impl Segment {
             .iter()
             .find(|&&(_, cost)| cost <= (1.0 + options.recovery) * least)
             .map(|&(s, _)| s)
+            .or(sample_time_s.is_none().then_some(0.0))
             .ok_or(SynthesisError::SampleTime { rho: self.rho, sample_time_s: sample_time_s.unwrap_or(0.0) })
     }
 

@@ -242,7 +242,15 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     }
     problem.maximize(&t);
     let terms = sum.stability_terms();
-    let answer = problem.solve(&solver())?;
+    let mut answer = problem.solve(&solver())?;
+    if matches!(answer.outcome, Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_)) {
+        // where every state has an input of its own any decay can be had: as fast as the plant itself is enough
+        let speed = (0..polytope.len()).map(|i| polytope.a(i).norm_l2()).fold(0.0, f64::max);
+        let ceiling = 2.0 * if speed > 0.0 { speed } else { 1.0 };
+        let ceiling = Expr::constant(Mat::from_fn(1, 1, |_, _| ceiling)) - &t;
+        problem.positive_definite_by("ceiling of the margin", ceiling, 0.0);
+        answer = problem.solve(&solver())?;
+    }
     let solved = answer.outcome.is_optimal();
     let moderated = |answer: Answer| -> Result<PolytopicDesign, SynthesisError> {
         let identity = Mat::identity(polytope.inputs(), polytope.inputs());
