@@ -8,14 +8,14 @@ use crate::scenario::door::Door;
 use lmi::{Explanation, Outcome, Witness};
 use lpv::certificate::{Claim, Record, Verdict, worst};
 use lpv::math::Mat;
-use lpv::math::decimal::{Rounding, about, at_least, decimal, fixed};
+use lpv::math::decimal::{Rounding, about, at_least, at_most, decimal, fixed};
 use lpv::math::eigen::symmetric_eigenvalues;
 use lpv::math::matrix::{quadratic_form, to_rows};
 use lpv::model::{FrozenModel, Polytope};
 use lpv::synthesis::SynthesisError;
 use lpv::synthesis::polytopic::{
-    BackOff, Lyapunov, Moderation, PolytopicDesign, PolytopicRequest, Solution, Theorem, UnstabilizablePoint, frozen,
-    synthesize,
+    BackOff, Lyapunov, Moderation, Objective, PolytopicDesign, PolytopicRequest, Solution, Theorem,
+    UnstabilizablePoint, frozen, synthesize,
 };
 use serde::Serialize;
 use serde::ser::SerializeMap;
@@ -42,6 +42,9 @@ pub struct Report {
     objective: Option<f64>,
     /// What `objective` is.
     objective_is: &'static str,
+    /// Whether the objective is a cost bound, the smaller the better.
+    #[serde(skip)]
+    is_cost_bound: bool,
     /// The objective of the design that is returned; below the optimum where a part of it was given back.
     #[serde(skip_serializing_if = "Option::is_none")]
     achieved: Option<f64>,
@@ -252,7 +255,7 @@ fn report(
     let severity = |design: &PolytopicDesign| match status(design) {
         "infeasible" | "infeasible within a radius" => 3,
         "unbounded" | "unbounded to tolerance" => 2,
-        "inaccurate" => 1,
+        INACCURATE => 1,
         _ => 0,
     };
     let worst = (0..designs.len()).rev().max_by_key(|&k| severity(&designs[k])).unwrap_or(0);
@@ -298,6 +301,7 @@ fn report(
         },
         objective: solutions.as_ref().and(objective),
         objective_is,
+        is_cost_bound: plan.weights.is_some() && !plan.region && !matches!(plan.objective, Objective::Trace),
         achieved: solutions.as_ref().and_then(|_| self::objective(plan, designs, &PolytopicDesign::achieved).0),
         back_off: moderations.iter().map(|moderation| moderation.back_off).reduce(f64::max),
         optimum_is_attained: (!moderations.is_empty())
@@ -341,7 +345,7 @@ fn status(design: &PolytopicDesign) -> &'static str {
         _ if design.is_infeasible() => "infeasible",
         _ if design.is_solved() => SOLVED,
         _ if design.undetectable.is_some() => "unbounded",
-        _ if outcome.is_optimal() => "inaccurate",
+        _ if outcome.is_optimal() => INACCURATE,
         _ => outcome.word(),
     }
 }
@@ -357,7 +361,7 @@ fn objective(
         _ if plan.weights.is_none() => {
             (all.reduce(f64::min), "largest margin t with every inequality at least tI, tr Y <= n")
         }
-        (lpv::synthesis::polytopic::Objective::Trace, _) => (Some(all.sum()), "sum of tr Y"),
+        (Objective::Trace, _) => (Some(all.sum()), "sum of tr Y"),
         (_, Some(saturation)) if plan.region => {
             let reach = all.map(|bound| (saturation.gamma / bound).sqrt()).reduce(f64::min);
             (reach, "reach of the certified set along every direction, in multiples of it")
@@ -463,20 +467,18 @@ impl Report {
         if let (Some(achieved), Some(share)) = (self.achieved, self.back_off) {
             let attained = self.optimum_is_attained.unwrap_or(true);
             let of = if attained { "the optimum" } else { "what the solver came to, an optimum that is not attained" };
+            // a cost bound is rounded up, what is maximised down
+            let achieved = if self.is_cost_bound { at_most(achieved) } else { at_least(achieved) };
             let given = match share > 0.0 {
-                true => format!(
-                    "{}  (up to {} % of {of} given back for a smaller gain)",
-                    at_least(achieved),
-                    about(100.0 * share)
-                ),
-                false => format!("{}  ({of}, with a moderate gain)", at_least(achieved)),
+                true => format!("{achieved}  (up to {} % of {of} given back for a smaller gain)", about(100.0 * share)),
+                false => format!("{achieved}  ({of}, with a moderate gain)"),
             };
             line("achieved", given);
         }
         if let Some(gain) = self.largest_gain {
             line("largest gain", about(gain));
         }
-        if let Some(k) = self.k.as_ref().filter(|_| self.status == SOLVED) {
+        if let Some(k) = &self.k {
             for (place, k) in self.places.iter().zip(k) {
                 for (i, row) in k.iter().enumerate() {
                     let numbers: Vec<String> = row.iter().map(|value| format!("{:>13}", fixed(*value, 6))).collect();
@@ -518,7 +520,7 @@ impl Report {
         match self.status {
             SOLVED => None,
             "infeasible" | "unbounded" => Some(Failure::NoOptimum(message + &self.relaxation())),
-            "inaccurate" => Some(Failure::NotCertified(message)),
+            INACCURATE => Some(Failure::NotCertified(message)),
             _ => Some(Failure::NotCertified(message + &self.relaxation())),
         }
     }
