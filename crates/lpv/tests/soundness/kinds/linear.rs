@@ -83,15 +83,21 @@ pub fn examine(numbers: &mut Numbers, tally: &mut Tally, linear: &Linear) -> Res
     };
     let claims = attack(numbers, tally, &of, &ProofOptions::default(), &[0.0])?;
     for claim in &claims {
+        tally.witnesses += usize::from(is_refuted_by_its_step(claim));
         sampled(numbers, linear, claim)
             .map_err(|reason| format!("{} is {}: {reason}", claim.id, claim.verdict.word()))?;
     }
     Ok(claims)
 }
 
+/// Whether the claim is refuted by a sample that [`sampled`] takes again.
+pub fn is_refuted_by_its_step(claim: &Claim) -> bool {
+    claim.verdict == Verdict::Refuted && matches!(claim.kind, ClaimKind::SampledInvariance { .. })
+}
+
 /// The claims about the loop with zero-order hold.
 pub fn sampled(numbers: &mut Numbers, linear: &Linear, claim: &Claim) -> Result<(), String> {
-    let Linear { a, b, k, p, limits, operating, sample_time_s, .. } = linear;
+    let Linear { a, b, k, p, sample_time_s, .. } = linear;
     match (&claim.kind, claim.verdict) {
         (ClaimKind::SampledStability { .. }, Verdict::Proved | Verdict::Refuted) => {
             let (phi, gamma) = discretize(a, b, *sample_time_s);
@@ -104,22 +110,13 @@ pub fn sampled(numbers: &mut Numbers, linear: &Linear, claim: &Claim) -> Result<
         }
         (ClaimKind::SampledInvariance { level, .. }, Verdict::Proved) => {
             let between = claim.detail.contains("between");
-            let (below, above) = crate::loops::sides(limits, operating);
-            let (n, m) = (a.nrows(), b.ncols());
+            let held = Held::of(linear);
             for _ in 0..3 {
                 let share = if between { numbers.of(&[1.0, 0.5, 0.25, 0.9]) } else { 1.0 };
-                let (phi, gamma) = discretize(a, b, share * sample_time_s);
-                let mut x: Vec<f64> = (0..n).map(|_| numbers.next()).collect();
+                let mut x: Vec<f64> = (0..a.nrows()).map(|_| numbers.next()).collect();
                 let scale = (level / quadratic_form(p, &x)).sqrt() * numbers.of(&[1.0, 1.0, 0.3]);
                 x.iter_mut().for_each(|x| *x *= scale);
-                let s: Vec<f64> =
-                    (0..m).map(|i| (0..n).map(|j| k[(i, j)] * x[j]).sum::<f64>().clamp(-below[i], above[i])).collect();
-                let next: Vec<f64> = (0..n)
-                    .map(|i| {
-                        (0..n).map(|j| phi[(i, j)] * x[j]).sum::<f64>()
-                            - (0..m).map(|j| gamma[(i, j)] * s[j]).sum::<f64>()
-                    })
-                    .collect();
+                let next = held.after(&x, &held.input(&x), share * sample_time_s);
                 let (v, after) = (quadratic_form(p, &x), quadratic_form(p, &next));
                 if after > v * (1.0 + 1e-9) {
                     return Err(format!("V goes from {v} to {after} after {share} of the sample time"));
@@ -127,8 +124,83 @@ pub fn sampled(numbers: &mut Numbers, linear: &Linear, claim: &Claim) -> Result<
             }
             Ok(())
         }
+        (ClaimKind::SampledInvariance { level, .. }, Verdict::Refuted) => {
+            let x = &claim.witness.as_ref().ok_or("there is no witness")?.state;
+            let held = Held::of(linear);
+            let next = held.after(x, &held.input(x), *sample_time_s);
+            let rounding = |x: &[f64]| 1e-12 * p.norm_max() * x.iter().map(|x| x.abs()).sum::<f64>().powi(2);
+            let (v, after) = (quadratic_form(p, x), quadratic_form(p, &next));
+            let is_in = v <= level + rounding(x);
+            let leaves = after >= level - rounding(&next);
+            if is_in && leaves { Ok(()) } else { Err(format!("V goes from {v} to {after}, of {level}")) }
+        }
+        (ClaimKind::SampledCost { factor, level, .. }, Verdict::Proved) => {
+            let held = Held::of(linear);
+            let mut x: Vec<f64> = (0..a.nrows()).map(|_| numbers.next()).collect();
+            let scale = level.map_or(1.0, |level| (level / quadratic_form(p, &x)).sqrt());
+            x.iter_mut().for_each(|x| *x *= scale * (1.0 - 1e-12));
+            let bound = factor * quadratic_form(p, &x);
+            let cost = held.cost(x, 200);
+            if cost > bound * (1.0 + 1e-6) {
+                Err(format!("the motion costs {cost}, more than {bound}"))
+            } else {
+                Ok(())
+            }
+        }
         _ => Ok(()),
     }
+}
+
+/// The saturated loop with zero-order hold, in floating point.
+struct Held<'a> {
+    linear: &'a Linear,
+    /// How far the inputs go below and above their operating values.
+    sides: (Vec<f64>, Vec<f64>),
+}
+
+impl<'a> Held<'a> {
+    fn of(linear: &'a Linear) -> Self {
+        Self { linear, sides: crate::loops::sides(&linear.limits, &linear.operating) }
+    }
+
+    /// sat(Kx), which is subtracted.
+    fn input(&self, x: &[f64]) -> Vec<f64> {
+        let (k, (below, above)) = (&self.linear.k, &self.sides);
+        let row = |i: usize| x.iter().enumerate().map(|(j, x)| k[(i, j)] * x).sum::<f64>();
+        (0..k.nrows()).map(|i| row(i).clamp(-below[i], above[i])).collect()
+    }
+
+    /// x after `time_s` with the input held.
+    fn after(&self, x: &[f64], held: &[f64], time_s: f64) -> Vec<f64> {
+        moved(&discretize(&self.linear.a, &self.linear.b, time_s), x, held)
+    }
+
+    /// ∫ xᵀQx + uᵀRu dt over that many samples, by Simpson's rule.
+    fn cost(&self, mut x: Vec<f64>, samples: usize) -> f64 {
+        let Linear { a, b, weights, sample_time_s, .. } = self.linear;
+        let time_s = sample_time_s / PARTS as f64;
+        let part = discretize(a, b, time_s);
+        let mut cost = 0.0;
+        for _ in 0..samples {
+            let held = self.input(&x);
+            let stage = |x: &[f64]| quadratic_form(&weights.q, x) + quadratic_form(&weights.r, &held);
+            cost += stage(&x);
+            for k in 1..=PARTS {
+                x = moved(&part, &x, &held);
+                cost += stage(&x) * if k == PARTS { 1.0 } else { [2.0, 4.0][k % 2] };
+            }
+        }
+        cost * time_s / 3.0
+    }
+}
+
+/// Parts of a sample, even: Simpson's rule is then right to a few parts in 10⁷ where a sample is as long as the plant's own motion.
+const PARTS: usize = 32;
+
+/// Φx − Γu
+fn moved((phi, gamma): &(Mat<f64>, Mat<f64>), x: &[f64], held: &[f64]) -> Vec<f64> {
+    let row = |m: &Mat<f64>, i: usize, y: &[f64]| y.iter().enumerate().map(|(j, y)| m[(i, j)] * y).sum::<f64>();
+    (0..x.len()).map(|i| row(phi, i, x) - row(gamma, i, held)).collect()
 }
 
 /// Whether the sampled loop of one or two integrators is stable, exactly; `None` of other plants.

@@ -2,7 +2,7 @@
 //! saturation, from samples at the edge of the set.
 
 use super::attack;
-use super::linear::{sampled, sampled_exactly};
+use super::linear::{is_refuted_by_its_step, sampled, sampled_exactly};
 use crate::Tally;
 use crate::loops::Linear;
 use crate::numbers::Numbers;
@@ -63,9 +63,11 @@ pub fn case(numbers: &mut Numbers, tally: &mut Tally) -> Result<(), String> {
             (ClaimKind::SampledStability { .. }, Verdict::Refuted) if stable => {
                 return Err(format!("{} is refuted, and the loop is exactly stable", claim.id));
             }
-            (ClaimKind::SampledInvariance { .. }, _) => {
+            (ClaimKind::SampledInvariance { .. } | ClaimKind::SampledCost { .. }, verdict) => {
+                tally.witnesses += usize::from(is_refuted_by_its_step(claim));
                 for _ in 0..8 {
-                    sampled(numbers, &linear, claim).map_err(|reason| format!("{} is proved: {reason}", claim.id))?;
+                    sampled(numbers, &linear, claim)
+                        .map_err(|reason| format!("{} is {}: {reason}", claim.id, verdict.word()))?;
                 }
             }
             _ => {}
