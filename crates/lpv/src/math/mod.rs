@@ -10,6 +10,7 @@ pub mod ball;
 pub mod decimal;
 pub mod definite;
 pub mod eigen;
+mod elimination;
 pub mod hold;
 pub mod hosvd;
 mod hurwitz;

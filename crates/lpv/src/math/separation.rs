@@ -9,10 +9,11 @@
 //! and not every −(AᵢY − BLᵢ) − (AᵢY − BLᵢ)ᵀ is positive definite: xᵀY⁻¹x falls at all vertices for no gain. Since BᵀSB = 0, S ⪰ 0 asks for
 //! SB = ΣZᵢAᵢB = 0. These equations hold of no rounded numbers; so with the rows of N a basis of what B does not reach, NB = 0, found without
 //! fractions, Zᵢ = NᵀWᵢN, and of the linear equations ΣWᵢNAᵢB = 0 as many entries of the Wᵢ as there are equations follow exactly from the
-//! others (E. H. Bareiss 1968). Whether Wᵢ ⪰ 0 and NSNᵀ ⪰ 0 is then decided on integers, too.
+//! others (`elimination.rs`). Whether Wᵢ ⪰ 0 and NSNᵀ ⪰ 0 is then decided on integers, too.
 
 use super::Mat;
 use super::definite::{Definiteness, eliminated};
+use super::elimination::Elimination;
 use super::hurwitz::{Integers, product};
 use super::stabilizability::{integers, quotient};
 use num_bigint::{BigInt, Sign};
@@ -69,7 +70,7 @@ impl Unreached {
     fn of(b: &Integers) -> Option<Self> {
         let (n, m) = (b.len(), b.first().map_or(0, Vec::len));
         let columns: Integers = (0..m).map(|j| (0..n).map(|i| b[i][j].clone()).collect()).collect();
-        let Elimination { rows, pivots, determinant } = Elimination::of(columns, (0..n).collect());
+        let Elimination { rows, pivots, determinant, .. } = Elimination::of(columns, 0..n);
         let free: Vec<usize> = (0..n).filter(|i| !pivots.contains(i)).collect();
         let basis = |&k: &usize| {
             let mut w = vec![BigInt::from(0); n];
@@ -78,43 +79,6 @@ impl Unreached {
             w
         };
         (!free.is_empty()).then(|| Self { rows: free.iter().map(basis).collect(), free })
-    }
-}
-
-/// Equations after elimination without fractions: d x_pivot + Σ c x_free = 0 in each row.
-struct Elimination {
-    rows: Integers,
-    pivots: Vec<usize>,
-    /// d
-    determinant: BigInt,
-}
-
-impl Elimination {
-    /// Of `rows`, with pivots in the columns of `order` as far as they go, in it.
-    fn of(mut rows: Integers, order: Vec<usize>) -> Self {
-        let mut pivots = Vec::new();
-        let mut determinant = BigInt::from(1);
-        for column in order {
-            let rank = pivots.len();
-            let size = |i: &usize| rows[*i][column].magnitude().clone();
-            let Some(found) = (rank..rows.len()).filter(|i| rows[*i][column].sign() != Sign::NoSign).max_by_key(size)
-            else {
-                continue;
-            };
-            rows.swap(rank, found);
-            let pivot_row = rows[rank].clone();
-            let pivot = pivot_row[column].clone();
-            for (_, row) in rows.iter_mut().enumerate().filter(|(i, _)| *i != rank) {
-                let factor = row[column].clone();
-                for (entry, of_pivot) in row.iter_mut().zip(&pivot_row) {
-                    *entry = (&*entry * &pivot - &factor * of_pivot) / &determinant;
-                }
-            }
-            determinant = pivot;
-            pivots.push(column);
-        }
-        rows.truncate(pivots.len());
-        Self { rows, pivots, determinant }
     }
 }
 
@@ -150,15 +114,14 @@ fn repaired(reached: &[Integers], free: &[usize], guess: &[Mat<f64>]) -> Option<
     // the diagonal entries are the largest of a semidefinite matrix: what follows from the others changes least in proportion
     let mut order: Vec<usize> = (0..unknowns).collect();
     order.sort_by(|&i, &j| values[j].abs().total_cmp(&values[i].abs()));
-    let Elimination { rows, pivots, determinant } = Elimination::of(equations, order);
+    let Elimination { rows, pivots, determinant, .. } = Elimination::of(equations, order);
     let integer = |x: f64| BigInt::from((x / largest * 2.0_f64.powi(BITS)).round() as i64);
     let sign = if determinant.sign() == Sign::Minus { -1 } else { 1 };
     let mut solution: Vec<BigInt> = values.iter().map(|&x| integer(x)).collect();
     let is_pivot: Vec<bool> = (0..unknowns).map(|k| pivots.contains(&k)).collect();
     let fixed: Vec<BigInt> =
         rows.iter().map(|row| (0..unknowns).filter(|&k| !is_pivot[k]).map(|k| &row[k] * &solution[k]).sum()).collect();
-    for (k, x) in solution.iter_mut().enumerate().filter(|(k, _)| !is_pivot[*k]) {
-        debug_assert!(!is_pivot[k]);
+    for (_, x) in solution.iter_mut().enumerate().filter(|(k, _)| !is_pivot[*k]) {
         *x *= &determinant * sign;
     }
     for (&pivot, fixed) in pivots.iter().zip(&fixed) {

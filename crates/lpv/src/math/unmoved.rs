@@ -1,9 +1,10 @@
 //! Is there a point of a polytope at which a given combination of states is moved by no input? Decided exactly.
 //!
-//! For a given w the conditions wᵀA(ρ) = λwᵀ, wᵀB(ρ) = 0, Σρᵢ = 1 are linear in (ρ, λ). On integers they are solved without fractions (E. H. Bareiss 1968):
+//! For a given w the conditions wᵀA(ρ) = λwᵀ, wᵀB(ρ) = 0, Σρᵢ = 1 are linear in (ρ, λ). On integers they are solved without fractions (`elimination.rs`):
 //! unknowns that the equations leave free take the values of a guess, and the others follow. ρ ≥ 0 and λ ≥ 0 are then signs of integers.
 
 use super::Mat;
+use super::elimination::Elimination;
 use super::hurwitz::Integers;
 use super::stabilizability::{integers, quotient};
 use num_bigint::{BigInt, Sign};
@@ -62,34 +63,16 @@ impl Equations {
         (bits * (rows.len() * (count + 2)) as u64 <= MOST_BITS).then_some(Self { rows, scale })
     }
 
-    fn solve(mut self, weights: &[f64]) -> Option<(Vec<f64>, f64)> {
+    fn solve(self, weights: &[f64]) -> Option<(Vec<f64>, f64)> {
         let count = weights.len();
         let right = count + 1;
         // λ first, then the largest weights: what follows from the rest is what may change least in proportion
         let mut order: Vec<usize> = (0..count).collect();
         order.sort_by(|&i, &j| weights[j].total_cmp(&weights[i]));
-        let columns: Vec<usize> = std::iter::once(0).chain(order.iter().map(|i| i + 1)).collect();
-        let mut pivots: Vec<usize> = Vec::new();
-        let mut determinant = BigInt::from(1);
-        for &column in &columns {
-            let rank = pivots.len();
-            let Some(found) = (rank..self.rows.len()).find(|&i| self.rows[i][column].sign() != Sign::NoSign) else {
-                continue;
-            };
-            self.rows.swap(rank, found);
-            let pivot_row = self.rows[rank].clone();
-            let pivot = pivot_row[column].clone();
-            for (_, row) in self.rows.iter_mut().enumerate().filter(|(i, _)| *i != rank) {
-                let factor = row[column].clone();
-                for (entry, of_pivot) in row.iter_mut().zip(&pivot_row) {
-                    *entry = (&*entry * &pivot - &factor * of_pivot) / &determinant;
-                }
-            }
-            determinant = pivot;
-            pivots.push(column);
-        }
+        let columns = std::iter::once(0).chain(order.iter().map(|i| i + 1));
+        let Elimination { rows, rest, pivots, determinant } = Elimination::of(self.rows, columns);
         // a row without unknowns has to be 0 = 0
-        if self.rows[pivots.len()..].iter().any(|row| row[right].sign() != Sign::NoSign) {
+        if rest.iter().any(|row| row[right].sign() != Sign::NoSign) {
             return None;
         }
         // d x_pivot = right − Σ c x_free, all times 2^bits
@@ -98,7 +81,7 @@ impl Equations {
         let mut values: Vec<(BigInt, BigInt)> =
             (0..=count).map(|k| (BigInt::from(if k == 0 { 0 } else { guess(k - 1) }), BigInt::from(1))).collect();
         let free: Vec<usize> = (0..=count).filter(|k| !pivots.contains(k)).collect();
-        for (row, &column) in self.rows.iter().zip(&pivots) {
+        for (row, &column) in rows.iter().zip(&pivots) {
             let fixed: BigInt = free.iter().map(|&k| &row[k] * &values[k].0).sum();
             let numerator = (&row[right] << GUESS_BITS as u64) - fixed;
             let sign = if determinant.sign() == Sign::Minus { -1 } else { 1 };

@@ -279,14 +279,14 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     }))
     .flatten();
     if let Some(point) = point.as_ref().filter(|point| point.is_proved) {
-        let explanation = Explanation { distance: 0.0, carriers: carriers(point) };
+        let explanation = Explanation { distance: 0.0, carriers: carriers(&point.weights) };
         let refuted = PolytopicDesign::without_solution(answer);
         return Ok(PolytopicDesign { explanation: Some(explanation), unstabilizable: Some(point.clone()), ..refuted });
     }
     if request.lyapunov == Lyapunov::Common
         && let Some(separation) = Separation::of(polytope)
     {
-        let explanation = Explanation { distance: 0.0, carriers: separation.carriers() };
+        let explanation = Explanation { distance: 0.0, carriers: carriers(&separation.shares) };
         let refuted = PolytopicDesign::without_solution(answer);
         return Ok(PolytopicDesign { explanation: Some(explanation), separation: Some(separation), ..refuted });
     }
@@ -307,10 +307,10 @@ fn rests(lyapunov: &Lyapunov) -> bool {
         || rate_vertices.first().is_some_and(|first| (0..first.len()).all(|i| sum_is_zero(&rates(i))))
 }
 
-/// The stability inequalities of the vertices that a point lies between, with its weights for their shares.
-fn carriers(point: &UnstabilizablePoint) -> Vec<Carrier> {
-    let count = point.weights.len();
-    let mut carriers: Vec<Carrier> = (point.weights.iter().enumerate())
+/// The stability inequalities of the vertices that refute together, with their shares, largest first.
+fn carriers(shares: &[f64]) -> Vec<Carrier> {
+    let count = shares.len();
+    let mut carriers: Vec<Carrier> = (shares.iter().enumerate())
         .filter(|&(_, &share)| share > 1e-3)
         .map(|(i, &share)| Carrier {
             name: if count == 1 { "stability".into() } else { format!("stability at vertex {}", i + 1) },

@@ -24,7 +24,6 @@ use crate::math::Mat;
 use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::matrix::{inverse_spd, semidefinite_factor};
 use lmi::{Answer, Error, Expr, Options, Outcome, Problem};
-use serde::Serialize;
 
 /// How much of the optimum is given back.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,7 +38,7 @@ pub enum BackOff {
 }
 
 /// What was given back, and for what.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Moderation {
     /// β: the objective of the design is within this share of the optimum.
     pub back_off: f64,

@@ -16,14 +16,12 @@ use crate::math::eigen::symmetric_eigenvectors;
 use crate::math::matrix::trace;
 use crate::math::separation::separating;
 use crate::model::Polytope;
-use lmi::{Carrier, Expr, Outcome, Problem};
-use serde::Serialize;
+use lmi::{Expr, Outcome, Problem};
 
 /// Proof that no common Lyapunov function exists: [`crate::math::separation`].
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug)]
 pub struct Separation {
     /// Zᵢ of the vertices, rounded from the exact ones; their largest entry is 1.
-    #[serde(skip)]
     pub multipliers: Vec<Mat<f64>>,
     /// tr Zᵢ of the sum of all: which vertices exclude each other.
     pub shares: Vec<f64>,
@@ -45,18 +43,6 @@ impl Separation {
         let multipliers = separating(&a, polytope.b(0), &guess)?;
         let total: f64 = multipliers.iter().map(trace).sum();
         Some(Self { shares: multipliers.iter().map(|z| trace(z) / total).collect(), multipliers })
-    }
-
-    /// The vertices with their shares, largest first.
-    pub fn carriers(&self) -> Vec<Carrier> {
-        let single = self.shares.len() == 1;
-        let name = |i: usize| if single { "stability".into() } else { format!("stability at vertex {}", i + 1) };
-        let mut carriers: Vec<Carrier> = (self.shares.iter().enumerate())
-            .filter(|&(_, &share)| share > 1e-3)
-            .map(|(i, &share)| Carrier { name: name(i), share, alone: None })
-            .collect();
-        carriers.sort_by(|a, b| b.share.total_cmp(&a.share));
-        carriers
     }
 }
 
