@@ -60,6 +60,6 @@ impl Problem {
             return Ok(answer);
         }
         second.values.pop();
-        Ok(self.moved(answer, second.values))
+        Ok(self.moved(&answer, second.values).unwrap_or(answer))
     }
 }

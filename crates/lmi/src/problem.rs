@@ -175,15 +175,21 @@ impl Problem {
         Ok(verify(&Stated { problem: self, layout: &layout, margins: &margins }, values).0)
     }
 
-    /// The answer with other values of the unknowns, where these are proved to satisfy the inequalities; otherwise as it was.
-    pub(crate) fn moved(&self, answer: Answer, values: Vec<Mat<f64>>) -> Answer {
+    /// The answer of this problem with other values of the unknowns, one matrix for each in the order made; `None` where these are not proved to
+    /// satisfy the inequalities. Bounds and multipliers stay those of the answer.
+    ///
+    /// # Panics
+    ///
+    /// When the values do not match the unknowns in number and size.
+    pub fn moved(&self, answer: &Answer, values: Vec<Mat<f64>>) -> Option<Answer> {
         let layout = Layout::new(&self.unknowns);
         let margins: Vec<f64> = answer.blocks.iter().map(|block| block.margin).collect();
         let stated = Stated { problem: self, layout: &layout, margins: &margins };
         let (blocks, proof) = verify(&stated, &values);
         if !proof.proved {
-            return answer;
+            return None;
         }
+        let answer = answer.clone();
         let objective = stated.objective(&values);
         let gap = (objective - answer.dual_objective).abs();
         let mut residuals = answer.residuals;
@@ -201,7 +207,7 @@ impl Problem {
             }
             other => other,
         };
-        Answer { outcome, blocks, objective, gap, optimum_bound, attained, residuals, values, ..answer }
+        Some(Answer { outcome, blocks, objective, gap, optimum_bound, attained, residuals, values, ..answer })
     }
 
     /// With bounds on the unknowns, and the best-conditioned point after the optimum, where the options ask for them.

@@ -302,7 +302,7 @@ fn report(
         objective: solutions.as_ref().and(objective),
         objective_is,
         is_cost_bound: plan.weights.is_some() && !plan.region && !matches!(plan.objective, Objective::Trace),
-        achieved: solutions.as_ref().and_then(|_| self::objective(plan, designs, &PolytopicDesign::achieved).0),
+        achieved: solutions.as_ref().and_then(|_| self::objective(plan, designs, &|design| design.answer.objective).0),
         back_off: moderations.iter().map(|moderation| moderation.back_off).reduce(f64::max),
         optimum_is_attained: (!moderations.is_empty())
             .then(|| moderations.iter().all(|moderation| moderation.is_attained)),

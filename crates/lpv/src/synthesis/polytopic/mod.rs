@@ -95,8 +95,8 @@ pub struct HighGain {
 /// What was found, whatever the outcome.
 #[derive(Debug)]
 pub struct PolytopicDesign {
-    /// The solver's answer: outcome, blocks with rigorous margins, witness. Of a design for which a part of the optimum was given
-    /// back it is the second stage's, and its objective the effort.
+    /// The solver's answer: outcome, objective, blocks with rigorous margins, witness. Where a part of the optimum was given back objective
+    /// and blocks are those of the design that is returned, and the outcome is that of the optimum.
     pub answer: Answer,
     /// What was given back of the optimum; `None` where nothing was asked for.
     pub moderation: Option<Moderation>,
@@ -125,11 +125,6 @@ impl PolytopicDesign {
     /// The optimum of what was asked for, whatever was given back of it.
     pub fn optimum(&self) -> f64 {
         self.moderation.as_ref().map_or(self.answer.objective, |moderation| moderation.optimum)
-    }
-
-    /// What the design that is returned has of it.
-    pub fn achieved(&self) -> f64 {
-        self.moderation.as_ref().map_or(self.answer.objective, |moderation| moderation.achieved)
     }
 
     /// Whether it is refuted, by the solver's witness or by a point that is proved not to be stabilisable.
@@ -428,7 +423,6 @@ fn regulate(
     let is_attained = is_regulator && answer.outcome.is_feasible();
     let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
     let moderated = stage.moderate(answer, back_off, &solver())?;
-    let shrink = moderated.shrink;
     let mut design = finish(&problem, moderated, &unknowns, auxiliary.as_deref())?;
     design.withdraw_infeasible(polytope);
     (design.undetectable, design.unstabilizable) = (undetectable, seems_unstabilizable);
@@ -451,8 +445,7 @@ fn regulate(
             halvings += 1;
         }
     }
-    let shrunk = |l: &Expr| scaled(&design.answer.value(l), 1.0 / shrink);
-    solution.l = on_segment(s).iter().map(shrunk).collect();
+    solution.l = on_segment(s).iter().map(|l| design.answer.value(l)).collect();
     solution.gain = solution.l.iter().zip(&solution.p).map(|(l, p)| l * p).collect();
     solution.auxiliary_gain = Some(low);
     solution.s = Some(s);
@@ -546,10 +539,6 @@ fn distinct<'a>(y: &'a [Expr], lyapunov: &Lyapunov) -> Vec<&'a Expr> {
     }
 }
 
-fn scaled(matrix: &Mat<f64>, factor: f64) -> Mat<f64> {
-    Mat::from_fn(matrix.nrows(), matrix.ncols(), |i, j| factor * matrix[(i, j)])
-}
-
 fn is_diagonal(matrix: &Mat<f64>) -> bool {
     (0..matrix.nrows()).all(|i| (0..matrix.ncols()).all(|j| i == j || matrix[(i, j)] == 0.0))
 }
@@ -561,13 +550,12 @@ fn finish(
     unknowns: &Unknowns,
     auxiliary: Option<&[Expr]>,
 ) -> Result<PolytopicDesign, SynthesisError> {
-    let Moderated { answer, shrink, moderation } = moderated;
+    let Moderated { answer, moderation } = moderated;
     let explanation = problem.explain(&answer, &solver())?;
     let solution = match answer.outcome {
         Outcome::Solved | Outcome::SolvedToTolerance(_) | Outcome::Inaccurate(_) => {
-            let values = |of: &[Expr]| -> Vec<Mat<f64>> {
-                of.iter().map(|expression| scaled(&answer.value(expression), 1.0 / shrink)).collect()
-            };
+            let values =
+                |of: &[Expr]| -> Vec<Mat<f64>> { of.iter().map(|expression| answer.value(expression)).collect() };
             let y: Vec<Mat<f64>> = values(&unknowns.y).iter().map(symmetric_part).collect();
             let l = values(&unknowns.l);
             let p: Option<Vec<Mat<f64>>> = y.iter().map(inverse_spd).collect();

@@ -46,13 +46,6 @@ pub struct Moderation {
     pub optimum: f64,
     /// Whether f* is the optimum to the solver's tolerance.
     pub is_attained: bool,
-    /// f of the design that is returned.
-    pub achieved: f64,
-    /// The largest √(uᵀRu) of the bare optimum's gain on {V ≤ 1}, V of the design with the largest share given back; infinite where
-    /// it has no definite Y.
-    pub effort_at_optimum: f64,
-    /// The same of the design that is returned.
-    pub effort: f64,
 }
 
 /// Shares of a cost that are tried, ascending.
@@ -90,10 +83,8 @@ pub(super) struct Stage<'a> {
 
 /// The answer of a design, with what was given back for it.
 pub(super) struct Moderated {
-    /// Of the second stage, or the first's.
+    /// The first stage's, moved to the point of the second.
     pub answer: Answer,
-    /// 1 + ε that Y and L are divided by.
-    pub shrink: f64,
     /// `None` where nothing was asked for, or nothing is solved.
     pub moderation: Option<Moderation>,
 }
@@ -107,7 +98,7 @@ fn is_feasible(answer: &Answer) -> bool {
 impl From<Answer> for Moderated {
     /// The answer as it is.
     fn from(answer: Answer) -> Self {
-        Self { answer, shrink: 1.0, moderation: None }
+        Self { answer, moderation: None }
     }
 }
 
@@ -119,7 +110,7 @@ impl Stage<'_> {
     pub fn moderate(&self, answer: Answer, back_off: BackOff, options: &Options) -> Result<Moderated, Error> {
         let is_attained = answer.outcome.is_optimal();
         let is_a_start = is_attained || matches!(answer.outcome, Outcome::Inaccurate(_));
-        let optimum = answer.value(&self.objective.value)[(0, 0)];
+        let optimum = answer.objective;
         if back_off == BackOff::Nothing || !is_a_start || !optimum.is_finite() || optimum <= self.least {
             return Ok(answer.into());
         }
@@ -128,39 +119,46 @@ impl Stage<'_> {
             _ => self.ladder.to_vec(),
         };
         let largest = ladder[ladder.len() - 1];
-        let Some(most) = self.second(optimum, largest, options)? else { return Ok(answer.into()) };
-        let effort_at_optimum = self.effort(&answer, &most);
-        let moderation = |back_off: f64, design: &Answer, shrink: f64| Moderation {
-            back_off,
-            optimum,
-            is_attained,
-            achieved: design.value(&self.objective.value)[(0, 0)] / shrink.powf(self.objective.sign()),
-            effort_at_optimum,
-            effort: self.effort(design, &most),
-        };
-        let strictly = |back_off: f64, design: Answer| {
-            let (shrink, moderation) = (1.0 + STRICTNESS, moderation(back_off, &design, 1.0 + STRICTNESS));
-            Moderated { answer: design, shrink, moderation: Some(moderation) }
+        let Some(most) = self.second(&answer, largest, options)? else { return Ok(answer.into()) };
+        let moderated = |back_off: f64, answer: Answer| {
+            let moderation = Some(Moderation { back_off, optimum, is_attained });
+            Moderated { answer, moderation }
         };
         let enough = KNEE * self.effort(&most, &most);
         if back_off == BackOff::Knee {
-            if is_attained && effort_at_optimum <= enough {
-                let moderation = moderation(0.0, &answer, 1.0);
-                return Ok(Moderated { answer, shrink: 1.0, moderation: Some(moderation) });
+            if is_attained && self.effort(&answer, &most) <= enough {
+                return Ok(moderated(0.0, answer));
             }
             for &share in &ladder[..ladder.len() - 1] {
-                let second = self.second(optimum, share, options)?;
+                let second = self.second(&answer, share, options)?;
                 if let Some(second) = second.filter(|second| self.effort(second, &most) <= enough) {
-                    return Ok(strictly(share, second));
+                    return Ok(moderated(share, second));
                 }
             }
         }
-        let design = most.clone();
-        Ok(strictly(largest, design))
+        Ok(moderated(largest, most))
     }
 
-    /// The design of least effort with the share `share` of `optimum` given back; `None` where the solver does not find it.
-    fn second(&self, optimum: f64, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
+    /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it.
+    fn second(&self, first: &Answer, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
+        let point = self.least_effort(first.objective, share, options)?;
+        Ok(point.and_then(|point| self.problem.moved(first, self.strict(&point))))
+    }
+
+    /// The unknowns of the first stage at a point of the second, (Y, L)/(1 + ε), and t(1 + ε) of a cost bound.
+    fn strict(&self, point: &Answer) -> Vec<Mat<f64>> {
+        let count = self.problem.unknown_names().len();
+        let scaled = |(i, value): (usize, &Mat<f64>)| {
+            // a bound is the last of the unknowns
+            let is_bound = !self.objective.is_maximised && i + 1 == count;
+            let factor = if is_bound { 1.0 + STRICTNESS } else { 1.0 / (1.0 + STRICTNESS) };
+            Mat::from_fn(value.nrows(), value.ncols(), |i, j| factor * value[(i, j)])
+        };
+        point.unknown_values()[..count].iter().enumerate().map(scaled).collect()
+    }
+
+    /// The point of least effort with the share `share` of `optimum` given back, with the unknowns of the second stage after those of the first.
+    fn least_effort(&self, optimum: f64, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
         let one = |value: f64| Expr::constant(Mat::from_fn(1, 1, |_, _| value));
         let mut problem = self.problem.clone();
         let tau = problem.scalar("effort");
