@@ -8,6 +8,7 @@ mod governed;
 mod jacobians;
 mod layering;
 mod moving_parameter;
+mod numbers;
 mod polytopic;
 mod proofs;
 mod quadrotor;

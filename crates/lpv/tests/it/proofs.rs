@@ -1,5 +1,6 @@
 //! What is proved stays true under exact arithmetic and random sampling, and what is false is never proved.
 
+use crate::numbers::Numbers;
 use crate::quadrotor::{limits, plant, spec, weights};
 use lpv::certificate::{
     Claim, ClaimKind, PolytopicClaim, PolytopicLyapunov, ProofOptions, Verdict, lyapunov_matrix, prove, prove_polytopic,
@@ -14,16 +15,6 @@ use lpv::synthesis::polytopic::InputBounds;
 use lpv::synthesis::{
     CostWeights, Design, DesignRequest, HighGainOptions, Method, RateBoundedOptions, ScheduleKind, design,
 };
-
-/// A stream of numbers in (−1, 1) from a seed.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as f64) / f64::from(1_u32 << 30) - 1.0
-    }
-}
 
 /// The claim of this name about the model.
 fn claim<'a>(claims: &'a [Claim], name: &str) -> &'a Claim {

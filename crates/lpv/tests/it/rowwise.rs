@@ -1,5 +1,6 @@
 //! High gains proved row by row: what is proved is true of every mixture of rows, and nothing is lost on the segment that the synthesis takes.
 
+use crate::numbers::Numbers;
 use lpv::certificate::{
     Claim, ClaimKind, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Verdict, prove, prove_polytopic,
 };
@@ -12,20 +13,6 @@ use lpv::model::Polytope;
 use lpv::plant::{LinearParameters, PlantSpec};
 use lpv::synthesis::polytopic::InputBounds;
 use lpv::synthesis::{CostWeights, Design, FrozenDesign, HighGainOptions, Method};
-
-/// A stream of numbers in (−1, 1) from a seed.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as f64) / f64::from(1_u32 << 30) - 1.0
-    }
-
-    fn matrix(&mut self, rows: usize, columns: usize) -> Mat<f64> {
-        Mat::from_fn(rows, columns, |_, _| self.next())
-    }
-}
 
 /// A loop with a high gain: ẋ = Ax − Bs, s between Fx and Kx.
 struct Case {

@@ -1,5 +1,6 @@
 //! The saturated sampled loop: what is proved no motion contradicts, what is refuted a motion does, and the edge between is where it should be.
 
+use crate::numbers::Numbers;
 use lpv::certificate::{Claim, ProofOptions, Proofs, Verdict, lyapunov_matrix, prove};
 use lpv::controller::{Controller, InputLimits, Schedule};
 use lpv::math::Mat;
@@ -11,20 +12,6 @@ use lpv::plant::{LinearParameters, PlantSpec};
 use lpv::synthesis::{
     CostWeights, Design, DesignRequest, FrozenDesign, HighGainOptions, Method, RateBoundedOptions, ScheduleKind, design,
 };
-
-/// A stream of numbers in (−1, 1) from a seed.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) as f64) / f64::from(1_u32 << 30) - 1.0
-    }
-
-    fn matrix(&mut self, rows: usize, columns: usize) -> Mat<f64> {
-        Mat::from_fn(rows, columns, |_, _| self.next())
-    }
-}
 
 /// ẋ = Ax − B sat(Kx), sampled every T, with V = xᵀPx and a low gain F where there is one.
 #[derive(Clone)]
