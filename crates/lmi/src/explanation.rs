@@ -44,7 +44,11 @@ impl Explanation {
 
 impl fmt::Display for Explanation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "no solution: every inequality would have to give way by {:.3e}", self.distance)?;
+        // by how little, where it is known
+        match self.distance > 0.0 {
+            true => writeln!(f, "no solution: every inequality would have to give way by {:.3e}", self.distance)?,
+            false => writeln!(f, "no solution: these inequalities contradict each other")?,
+        }
         for carrier in &self.carriers {
             write!(f, "  {:5.1} %  {}", 100.0 * carrier.share, carrier.name)?;
             match carrier.alone {

@@ -13,7 +13,7 @@ use crate::scenario::door::Door;
 use crate::scenario::{file as scenario_file, weights};
 use file::{DesignTable, LyapunovName, MethodName, ModelTable, ObjectiveName, ProblemFile};
 use lpv::math::Mat;
-use lpv::math::matrix::from_rows;
+use lpv::math::matrix::{from_rows, is_diagonal};
 use lpv::model::FrozenModel;
 use lpv::synthesis::polytopic::{BackOff, HighGain, InputBounds, Lyapunov, Objective, rate_box_vertices};
 use lpv::synthesis::{CostWeights, HighGainOptions};
@@ -28,8 +28,10 @@ const MOST_VERTICES: usize = 64;
 const MOST_BLOCKS: usize = 4096;
 /// States of a model.
 const MOST_STATES: usize = 60;
-/// Inputs of a high-gain design: there are 2^m mixtures.
-const MOST_HIGH_GAIN_INPUTS: usize = 10;
+/// Inputs of a high-gain design whose R is not diagonal: there are 2^m mixtures, each an inequality.
+const MOST_COUPLED_INPUTS: usize = 10;
+/// Inputs of a high-gain design with diagonal R, whose mixtures follow from one inequality.
+const MOST_HIGH_GAIN_INPUTS: usize = 64;
 /// Convex weights sum to one, and rates to zero, up to this.
 const SUM_TOLERANCE: f64 = 1e-9;
 
@@ -107,7 +109,7 @@ impl ProblemPlan {
 
         let weights = cost_weights(&door, file.weights, design.method, n, m)?;
         let saturation = saturation(&door, &design, m)?;
-        let high_gain = high_gain(&door, &design, m)?;
+        let high_gain = high_gain(&door, &design, weights.as_ref(), m)?;
         let (objective, region) = objective(&door, &design, n, saturation.is_some())?;
         let scope = match lyapunov {
             LyapunovName::Frozen => Scope::Frozen,
@@ -261,7 +263,12 @@ fn saturation(door: &Door, design: &DesignTable, m: usize) -> Result<Option<Inpu
     }
 }
 
-fn high_gain(door: &Door, design: &DesignTable, m: usize) -> Result<Option<HighGain>, Failure> {
+fn high_gain(
+    door: &Door,
+    design: &DesignTable,
+    weights: Option<&CostWeights>,
+    m: usize,
+) -> Result<Option<HighGain>, Failure> {
     let saturated = matches!(design.method, MethodName::Slqr | MethodName::Slpvqr);
     if !design.high_gain {
         let settings = [
@@ -277,9 +284,11 @@ fn high_gain(door: &Door, design: &DesignTable, m: usize) -> Result<Option<HighG
     if !saturated {
         return door.refuse("design.high_gain", "belongs to the methods \"slqr\" and \"slpvqr\" only");
     }
-    if m > MOST_HIGH_GAIN_INPUTS {
-        return door
-            .refuse("design.high_gain", format!("is for up to {MOST_HIGH_GAIN_INPUTS} inputs; the model has {m}"));
+    let is_coupled = weights.is_some_and(|weights| !is_diagonal(&weights.r));
+    let (most, with) =
+        if is_coupled { (MOST_COUPLED_INPUTS, " with an R that is not diagonal") } else { (MOST_HIGH_GAIN_INPUTS, "") };
+    if m > most {
+        return door.refuse("design.high_gain", format!("is for up to {most} inputs{with}; the model has {m}"));
     }
     let default = HighGainOptions::default();
     let recovery = design.recovery.unwrap_or(default.recovery);

@@ -155,8 +155,14 @@ impl Serialize for Margins {
 }
 
 /// Shares of the optimum that are given back in turn until the design is proved, where the file names none.
-const PROVABLE: [BackOff; 5] =
-    [BackOff::Knee, BackOff::Share(0.05), BackOff::Share(0.1), BackOff::Share(0.2), BackOff::Share(0.4)];
+const PROVABLE: [BackOff; 6] = [
+    BackOff::Knee,
+    BackOff::Share(0.01),
+    BackOff::Share(0.05),
+    BackOff::Share(0.1),
+    BackOff::Share(0.2),
+    BackOff::Share(0.4),
+];
 
 /// Solve the problem. What is called solved is proved: every claim of `lpv certify` about the file that is written.
 pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
@@ -173,7 +179,9 @@ pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
         report.take_what_is_proved(plan, &claims);
         report.iterations = iterations;
         report.seconds = started.elapsed().as_secs_f64();
-        if report.status != SOLVED || report.is_proved_by(plan, &claims) {
+        let is_stalled = report.status == INACCURATE && report.k.is_some();
+        let is_final = report.status != SOLVED && !is_stalled;
+        if is_final || report.status == SOLVED && report.is_proved_by(plan, &claims) {
             let answer = first.filter(|_| report.status != SOLVED).unwrap_or(report);
             return Ok(answer.without_unproved_gain());
         }

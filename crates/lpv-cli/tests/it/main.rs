@@ -1,6 +1,7 @@
 //! The program as a user meets it: files and arguments in; files, messages and exit codes out.
 
 mod bad_input;
+mod compleib;
 mod mutated;
 mod polytopes;
 mod problems;

@@ -8,6 +8,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 const POLYTOPES: &str = include_str!("../cases/polytopes/polytopes.json");
+/// Others of the same kind, which were drawn when the first were designed.
+const MORE: &str = include_str!("../cases/polytopes/polytopes-20261128.json");
 
 #[derive(Deserialize)]
 struct Polytope {
@@ -65,12 +67,21 @@ impl Polytope {
     }
 }
 
-/// 88 are feasible and 12 are not.
 #[test]
 fn every_polytope_is_designed_or_refuted() {
-    let polytopes: Vec<Polytope> = serde_json::from_str(POLYTOPES).unwrap();
+    all_are_designed_or_refuted(POLYTOPES, (88, 12));
+}
+
+#[test]
+fn so_is_every_polytope_of_another_seed() {
+    all_are_designed_or_refuted(MORE, (84, 16));
+}
+
+/// So many are feasible, and so many are not.
+fn all_are_designed_or_refuted(corpus: &str, counts: (usize, usize)) {
+    let polytopes: Vec<Polytope> = serde_json::from_str(corpus).unwrap();
     let count = |feasible| polytopes.iter().filter(|polytope| polytope.feasible == Some(feasible)).count();
-    assert_eq!((count(true), count(false)), (88, 12));
+    assert_eq!((count(true), count(false)), counts);
     let methods = ["lpvqr", "slpvqr", "high-gain", "stabilize"];
     std::thread::scope(|scope| {
         let each = |method: &'static str| {

@@ -52,6 +52,11 @@ pub fn is_symmetric(matrix: &Mat<f64>, tolerance: f64) -> bool {
         && (matrix - matrix.transpose()).norm_max() <= tolerance * matrix.norm_max().max(f64::MIN_POSITIVE)
 }
 
+/// Whether every entry off the diagonal is zero.
+pub fn is_diagonal(matrix: &Mat<f64>) -> bool {
+    (0..matrix.nrows()).all(|i| (0..matrix.ncols()).all(|j| i == j || matrix[(i, j)] == 0.0))
+}
+
 /// Whether every entry is finite.
 pub fn is_finite(matrix: &Mat<f64>) -> bool {
     (0..matrix.ncols()).all(|j| (0..matrix.nrows()).all(|i| matrix[(i, j)].is_finite()))

@@ -35,7 +35,7 @@ use super::high_gain::Segment;
 use super::{CostWeights, HighGainOptions, SynthesisError};
 use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
-use crate::math::matrix::{inverse_spd, symmetric_part, trace};
+use crate::math::matrix::{inverse_spd, is_diagonal, symmetric_part, trace};
 use crate::math::riccati::{self, Regulator, RiccatiError};
 use crate::math::stabilizability::{Mode, Stabilizability, stabilizability};
 use crate::math::unmoved::sum_is_zero;
@@ -194,10 +194,11 @@ impl Solution {
 /// parameter. Infeasible, unbounded and inaccurate are outcomes in the answer.
 ///
 /// # Panics
-/// If sizes of weights, bounds, rates or objective do not fit the polytope.
+/// If sizes of weights, bounds, rates or objective do not fit the polytope; for a high gain of more than 10 inputs with a general R, or of
+/// more than 64.
 pub fn synthesize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
     match &request.weights {
-        Some(weights) => regulate(polytope, request, weights),
+        Some(weights) => regulate(polytope, request, weights, WhereStalled::Refute),
         None => stabilize(polytope, request),
     }
 }
@@ -258,6 +259,7 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
             r_inverse: &identity,
             q: None,
             ladder: &MARGIN_LADDER,
+            reference: &[],
         };
         let moderated = stage.moderate(answer, request.back_off, &solver())?;
         finish(&problem, moderated, &unknowns, None)
@@ -289,10 +291,47 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
         true => stabilize_strictly(polytope, request)?,
         false => moderated(answer)?,
     };
+    let is_stalled = !design.is_solved() && matches!(design.answer.outcome, Outcome::Inaccurate(_));
+    if is_stalled
+        && request.back_off != BackOff::Nothing
+        && let Some(values) = stabilizing(polytope, request)?
+    {
+        let with_margin = |t: f64| [values.as_slice(), &[Mat::from_fn(1, 1, |_, _| t)]].concat();
+        let blocks = sum.stability(&unknowns.l, &Expr::zeros(1, 1));
+        // of a pair of vertices the margin counts twice
+        let weighted = |(block, (i, j)): (&(String, Expr), &(usize, usize)), at: &Answer| {
+            smallest_eigenvalue(&at.value(&block.1)) / if i == j { 1.0 } else { 2.0 }
+        };
+        let moved = problem.moved(&design.answer, with_margin(0.0)).and_then(|at| {
+            let margins = blocks.iter().zip(&terms).map(|pair| weighted(pair, &at));
+            problem.moved(&at, with_margin(LESS * margins.fold(f64::INFINITY, f64::min)))
+        });
+        if let Some(answer) = moved {
+            let moderation = Some(Moderation { back_off: 0.0, optimum: answer.objective, is_attained: false });
+            design = finish(&problem, Moderated { answer, moderation }, &unknowns, None)?;
+        }
+    }
     design.withdraw_infeasible(polytope);
     design.unstabilizable = point;
     Ok(design)
 }
+
+/// Y and L of a regulator with Q = I and R = I, which stabilises too, for where the largest margin is too small for the solver: scaled to
+/// tr Y ≤ n, one matrix for each unknown of the stabilisation but the margin. `None` where there is none.
+fn stabilizing(polytope: &Polytope, request: &PolytopicRequest) -> Result<Option<Vec<Mat<f64>>>, SynthesisError> {
+    let (n, m) = (polytope.states(), polytope.inputs());
+    let cost = CostWeights { q: Mat::identity(n, n), r: Mat::identity(m, m) };
+    let request =
+        PolytopicRequest { saturation: None, high_gain: None, objective: Objective::Trace, ..request.clone() };
+    let design = regulate(polytope, &request, &cost, WhereStalled::Stop)?;
+    let Some(Solution { y, l, .. }) = design.solution.as_ref().filter(|_| design.is_solved()) else { return Ok(None) };
+    let scale = LESS * n as f64 / y.iter().map(trace).fold(0.0, f64::max);
+    let distinct = if request.lyapunov == Lyapunov::Common { 1 } else { y.len() };
+    Ok(Some(y[..distinct].iter().chain(l).map(|matrix| scale * matrix).collect()))
+}
+
+/// A little less than 1, so that what is scaled is strict.
+const LESS: f64 = 1.0 - 1e-6;
 
 /// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean, taken exactly, tells.
 fn rests(lyapunov: &Lyapunov) -> bool {
@@ -337,6 +376,15 @@ fn stabilize_strictly(polytope: &Polytope, request: &PolytopicRequest) -> Result
 /// Margin of stability, of tr Y = n, below which the answer is taken for zero.
 const LEAST_MARGIN: f64 = 1e-7;
 
+/// What is done where the solver finds no regulator.
+#[derive(Clone, Copy, PartialEq)]
+enum WhereStalled {
+    /// Ask why: whether anything stabilises.
+    Refute,
+    /// Nothing: that is who asks.
+    Stop,
+}
+
 /// Theorems 2.1, 4.3, 4.4, 5.1-5.4.
 ///
 /// Whatever the weights and bounds, there is a solution if and only if the system can be stabilised by the same Lyapunov function:
@@ -347,6 +395,7 @@ fn regulate(
     polytope: &Polytope,
     request: &PolytopicRequest,
     cost: &CostWeights,
+    where_stalled: WhereStalled,
 ) -> Result<PolytopicDesign, SynthesisError> {
     let weights = Weights::new(cost).expect("weights are checked to be semidefinite and definite");
     let mut problem = Problem::new();
@@ -382,8 +431,9 @@ fn regulate(
     let answer = problem.solve(&solver())?;
     let mut seems_unstabilizable = None;
     let contradicts = matches!(answer.outcome, Outcome::Infeasible(_) | Outcome::InfeasibleWithin(_));
-    if contradicts || matches!(answer.outcome, Outcome::Inaccurate(_)) {
-        let stabilization = stabilize(polytope, request)?;
+    if where_stalled == WhereStalled::Refute && (contradicts || matches!(answer.outcome, Outcome::Inaccurate(_))) {
+        // whether there is a solution is all that is asked
+        let stabilization = stabilize(polytope, &PolytopicRequest { back_off: BackOff::Nothing, ..request.clone() })?;
         if stabilization.is_infeasible() {
             return Ok(stabilization);
         }
@@ -409,6 +459,9 @@ fn regulate(
             Err(_) => {}
         }
     }
+    let lqr =
+        |i: usize| riccati::solve(polytope.a(i), polytope.b(i), &cost.q, &cost.r).ok().map(|regulator| regulator.k);
+    let reference: Vec<Mat<f64>> = (0..polytope.len()).map(lqr).collect::<Option<_>>().unwrap_or_default();
     let low_l: Vec<Expr> = auxiliary.clone().unwrap_or_else(|| unknowns.l.clone());
     let stage = Stage {
         problem: &problem,
@@ -419,6 +472,7 @@ fn regulate(
         r_inverse: &weights.r_inverse,
         q: inverse_spd(&cost.q).map(|_| &cost.q),
         ladder: &COST_LADDER,
+        reference: &reference,
     };
     let is_attained = is_regulator && answer.outcome.is_feasible();
     let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
@@ -449,7 +503,8 @@ fn regulate(
     solution.gain = solution.l.iter().zip(&solution.p).map(|(l, p)| l * p).collect();
     solution.auxiliary_gain = Some(low);
     solution.s = Some(s);
-    solution.mixtures = (0..1usize << polytope.inputs())
+    solution.mixtures = listed_mixtures(polytope.inputs())
+        .into_iter()
         .flat_map(|mixture| {
             let l: Vec<Expr> =
                 on_segment(s).iter().zip(&low_l).map(|(l, low)| super::high_gain::mixture(mixture, l, low)).collect();
@@ -459,6 +514,17 @@ fn regulate(
         .map(|(name, block)| (name, smallest_eigenvalue(&design.answer.value(&block))))
         .collect();
     Ok(design)
+}
+
+/// Inputs up to which all mixtures are listed.
+const MOST_LISTED_INPUTS: usize = 10;
+
+/// The mixtures of a design that are listed: all 2^m of few inputs; of more, whose R is diagonal so that all follow, F and K_s themselves.
+fn listed_mixtures(inputs: usize) -> Vec<usize> {
+    match inputs <= MOST_LISTED_INPUTS {
+        true => (0..1 << inputs).collect(),
+        false => vec![0, usize::MAX >> (usize::BITS as usize - inputs)],
+    }
 }
 
 /// What is added to a solution of the Riccati equation: the least that is tried, relatively, the factor from one to the next, and how many.
@@ -537,10 +603,6 @@ fn distinct<'a>(y: &'a [Expr], lyapunov: &Lyapunov) -> Vec<&'a Expr> {
         Lyapunov::Common => vec![&y[0]],
         Lyapunov::ParameterDependent { .. } => y.iter().collect(),
     }
-}
-
-fn is_diagonal(matrix: &Mat<f64>) -> bool {
-    (0..matrix.nrows()).all(|i| (0..matrix.ncols()).all(|j| i == j || matrix[(i, j)] == 0.0))
 }
 
 /// Read the matrices from the answer; explain it where it is infeasible.

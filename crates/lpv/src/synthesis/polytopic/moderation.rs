@@ -17,7 +17,7 @@
 //!
 //! At its optimum the second problem rests on its boundary as the first does. What is returned is (Y, L)/(1 + ε): for
 //! W(P) = P(A − BK) + (A − BK)ᵀP + Q + KᵀRK ⪯ 0, W((1 + ε)P) = (1 + ε)W(P) − ε(Q + KᵀRK), and |kx| ≤ σ on V ≤ γ becomes strict, which
-//! pays for the rounding of K and P.
+//! pays for the rounding of K and P: by that of P alone kP⁻¹kᵀ moves by a share of cond(P) units in the last place. ε is a part of β.
 
 use super::objective::Posed;
 use crate::math::Mat;
@@ -31,7 +31,8 @@ pub enum BackOff {
     /// Nothing: the bare optimum, or what the solver reached on the way to one that is not attained.
     #[default]
     Nothing,
-    /// The least share of a short ladder after which more of it hardly makes the gain smaller; nothing where the optimum's gain is moderate.
+    /// The least share of a short ladder after which more of it hardly makes the gain smaller, or the gain is no larger than what the vertices
+    /// need one by one; nothing where the optimum's gain is moderate.
     Knee,
     /// β, 0 < β < 1.
     Share(f64),
@@ -52,14 +53,18 @@ pub struct Moderation {
 pub(super) const COST_LADDER: [f64; 4] = [1e-3, 1e-2, 5e-2, 1e-1];
 /// Shares of a margin of stability, which costs nobody anything.
 pub(super) const MARGIN_LADDER: [f64; 3] = [1e-2, 1e-1, 5e-1];
-/// The knee: the effort is at most this many times that of the largest share.
+/// The knee: the effort is at most this many times that of the largest share, or of the reference.
 const KNEE: f64 = 2.0;
 /// √(uᵀRu/xᵀQx) from which a gain counts as large: then, with some room for the effort, V is kept small relative to the running cost.
 const LARGE_GAIN: f64 = 1e3;
 /// How much more than the least τ may then be taken.
 const EFFORT_ROOM: f64 = 4.0;
-/// ε of the strictness that is paid for rounding.
-const STRICTNESS: f64 = 1e-6;
+/// ε of the strictness that is paid for rounding, as a share of what is given back, and at least.
+const STRICTNESS: (f64, f64) = (0.02, 1e-6);
+
+fn strictness(share: f64) -> f64 {
+    (STRICTNESS.0 * share).max(STRICTNESS.1)
+}
 
 /// The first stage, as the second builds on it.
 pub(super) struct Stage<'a> {
@@ -79,6 +84,8 @@ pub(super) struct Stage<'a> {
     pub q: Option<&'a Mat<f64>>,
     /// The shares that are tried, ascending.
     pub ladder: &'a [f64],
+    /// Gains that nobody calls large, one for each vertex: those of its own LQR. What the vertices need one by one is not worth giving cost back for.
+    pub reference: &'a [Mat<f64>],
 }
 
 /// The answer of a design, with what was given back for it.
@@ -87,12 +94,6 @@ pub(super) struct Moderated {
     pub answer: Answer,
     /// `None` where nothing was asked for, or nothing is solved.
     pub moderation: Option<Moderation>,
-}
-
-/// Whether every inequality is proved at the point of an answer. That its own objective is not at its optimum is no harm.
-fn is_feasible(answer: &Answer) -> bool {
-    let has_point = answer.outcome.is_optimal() || matches!(answer.outcome, Outcome::Inaccurate(_));
-    has_point && answer.blocks.iter().all(|block| block.verified_lower_bound > 0.0)
 }
 
 impl From<Answer> for Moderated {
@@ -118,18 +119,25 @@ impl Stage<'_> {
             BackOff::Share(share) => vec![share],
             _ => self.ladder.to_vec(),
         };
-        let largest = ladder[ladder.len() - 1];
-        let Some(most) = self.second(&answer, largest, options)? else { return Ok(answer.into()) };
+        // the largest share that the solver finds a design for, which rounding may keep it from
+        let mut found = None;
+        for (count, &share) in ladder.iter().enumerate().rev() {
+            if let Some(second) = self.second(&answer, share, options)? {
+                found = Some((count, share, second));
+                break;
+            }
+        }
+        let Some((smaller, largest, most)) = found else { return Ok(answer.into()) };
         let moderated = |back_off: f64, answer: Answer| {
             let moderation = Some(Moderation { back_off, optimum, is_attained });
             Moderated { answer, moderation }
         };
-        let enough = KNEE * self.effort(&most, &most);
+        let enough = KNEE * self.effort(&most, &most).max(self.effort_of(self.reference, &most));
         if back_off == BackOff::Knee {
             if is_attained && self.effort(&answer, &most) <= enough {
                 return Ok(moderated(0.0, answer));
             }
-            for &share in &ladder[..ladder.len() - 1] {
+            for &share in &ladder[..smaller] {
                 let second = self.second(&answer, share, options)?;
                 if let Some(second) = second.filter(|second| self.effort(second, &most) <= enough) {
                     return Ok(moderated(share, second));
@@ -141,29 +149,38 @@ impl Stage<'_> {
 
     /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it.
     fn second(&self, first: &Answer, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
-        let point = self.least_effort(first.objective, share, options)?;
-        Ok(point.and_then(|point| self.problem.moved(first, self.strict(&point))))
+        let points = self.least_effort(first.objective, share, options)?;
+        let has_point = |point: &&Answer| {
+            point.outcome.is_optimal() || matches!(point.outcome, Outcome::Inaccurate(_)) && point.objective.is_finite()
+        };
+        // of a solver that stopped short by rounding what is made strict may well be proved
+        let moved = |point: &Answer| self.problem.moved(first, self.strict(point, strictness(share)));
+        Ok(points.iter().filter(has_point).find_map(moved))
     }
 
     /// The unknowns of the first stage at a point of the second, (Y, L)/(1 + ε), and t(1 + ε) of a cost bound.
-    fn strict(&self, point: &Answer) -> Vec<Mat<f64>> {
+    fn strict(&self, point: &Answer, epsilon: f64) -> Vec<Mat<f64>> {
         let count = self.problem.unknown_names().len();
         let scaled = |(i, value): (usize, &Mat<f64>)| {
             // a bound is the last of the unknowns
             let is_bound = !self.objective.is_maximised && i + 1 == count;
-            let factor = if is_bound { 1.0 + STRICTNESS } else { 1.0 / (1.0 + STRICTNESS) };
+            let factor = if is_bound { 1.0 + epsilon } else { 1.0 / (1.0 + epsilon) };
             Mat::from_fn(value.nrows(), value.ncols(), |i, j| factor * value[(i, j)])
         };
         point.unknown_values()[..count].iter().enumerate().map(scaled).collect()
     }
 
-    /// The point of least effort with the share `share` of `optimum` given back, with the unknowns of the second stage after those of the first.
-    fn least_effort(&self, optimum: f64, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
+    /// Points of least effort with the share `share` of `optimum` given back, the better conditioned first, with the unknowns of the second
+    /// stage after those of the first.
+    fn least_effort(&self, optimum: f64, share: f64, options: &Options) -> Result<Vec<Answer>, Error> {
         let one = |value: f64| Expr::constant(Mat::from_fn(1, 1, |_, _| value));
         let mut problem = self.problem.clone();
         let tau = problem.scalar("effort");
         let sign = self.objective.sign();
-        let least = one(sign * optimum - share * optimum.abs());
+        // so that what is made strict still is within the share
+        let epsilon = strictness(share);
+        let given = ((share - epsilon) / (1.0 + epsilon)).max(0.0);
+        let least = one(sign * optimum - given * optimum.abs());
         problem.positive_definite_by("what is left of the optimum", sign * &self.objective.value - least, 0.0);
         for (i, (l, y)) in self.l.iter().zip(self.y).enumerate() {
             let block = Expr::symmetric_blocks(vec![vec![tau.times(self.r_inverse)], vec![l.t(), y.clone()]]);
@@ -171,12 +188,10 @@ impl Stage<'_> {
         }
         problem.minimize(&tau);
         let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
-        let least_effort = Some(problem.solve(&options)?).filter(is_feasible);
-        let (Some(q), Some(answer)) = (self.q, &least_effort) else { return Ok(least_effort) };
-        let effort = answer.value(&tau)[(0, 0)];
-        if effort * self.condition(answer, q) <= LARGE_GAIN.powi(2) {
-            return Ok(least_effort);
-        }
+        let least_effort = problem.solve(&options)?;
+        let effort = least_effort.value(&tau)[(0, 0)];
+        let large = |q: &&Mat<f64>| effort * self.condition(&least_effort, q) > LARGE_GAIN.powi(2);
+        let Some(q) = self.q.filter(large) else { return Ok(vec![least_effort]) };
         let nu = problem.scalar("condition");
         problem.positive_definite_by("what is left of the effort", one(EFFORT_ROOM * effort) - &tau, 0.0);
         for (i, y) in self.y.iter().enumerate() {
@@ -184,8 +199,7 @@ impl Stage<'_> {
             problem.positive_definite_by(format!("condition at vertex {}", i + 1), block, 0.0);
         }
         problem.minimize(&nu);
-        let conditioned = Some(problem.solve(&options)?).filter(is_feasible);
-        Ok(conditioned.or(least_effort))
+        Ok(vec![problem.solve(&options)?, least_effort])
     }
 
     /// The least ν with P ⪯ νQ at every vertex, Q ≻ 0.
@@ -198,18 +212,24 @@ impl Stage<'_> {
         self.y.iter().map(|y| at(y).unwrap_or(f64::INFINITY)).fold(0.0, f64::max)
     }
 
-    /// The largest √(uᵀRu) of u = −Kx over the vertices on the ellipsoid {V ≤ 1} of `measure`: √λ_max(R^½ K Y Kᵀ R^½) with
-    /// the K of `design` and the Y of `measure`. Infinite where Y of the design is not definite.
+    /// The largest √(uᵀRu) of u = −Kx over the vertices on the ellipsoid {V ≤ 1} of `measure`, for K of `design`. Infinite where Y of the
+    /// design is not definite.
     fn effort(&self, design: &Answer, measure: &Answer) -> f64 {
+        let gain = |(l, y): (&Expr, &Expr)| Some(design.value(l) * inverse_spd(&design.value(y))?);
+        let gains: Option<Vec<Mat<f64>>> = self.l.iter().zip(self.y).map(gain).collect();
+        gains.map_or(f64::INFINITY, |gains| self.effort_of(&gains, measure))
+    }
+
+    /// √λ_max(R^½ Kᵢ Yᵢ Kᵢᵀ R^½) with the Yᵢ of `measure`, the largest of all vertices; zero for no gains.
+    fn effort_of(&self, gains: &[Mat<f64>], measure: &Answer) -> f64 {
         let Some(root) = inverse_spd(self.r_inverse).and_then(|r| semidefinite_factor(&r)) else {
             return f64::INFINITY;
         };
-        let at = |(l, y): (&Expr, &Expr)| {
-            let Some(p) = inverse_spd(&design.value(y)) else { return f64::INFINITY };
-            let weighted = root.transpose() * design.value(l) * p;
+        let at = |(k, y): (&Mat<f64>, &Expr)| {
+            let weighted = root.transpose() * k;
             let effort = &weighted * measure.value(y) * weighted.transpose();
             symmetric_eigenvalues(&effort).into_iter().fold(0.0, f64::max).sqrt()
         };
-        self.l.iter().zip(self.y).map(at).fold(0.0, f64::max)
+        gains.iter().zip(self.y).map(at).fold(0.0, f64::max)
     }
 }

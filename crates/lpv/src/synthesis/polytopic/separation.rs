@@ -12,7 +12,6 @@
 
 use super::solver;
 use crate::math::Mat;
-use crate::math::eigen::symmetric_eigenvectors;
 use crate::math::matrix::trace;
 use crate::math::separation::separating;
 use crate::model::Polytope;
@@ -46,19 +45,21 @@ impl Separation {
     }
 }
 
-/// An orthonormal basis of the x with Mx = 0, as columns; n of them where M is empty.
-fn kernel(gram: &Mat<f64>) -> Option<Mat<f64>> {
-    let n = gram.nrows();
-    let (values, vectors) = symmetric_eigenvectors(gram)?;
-    let largest = values.last().copied().unwrap_or(0.0).max(0.0);
-    let dimension = values.iter().filter(|&&value| value <= (RANK * RANK).max(f64::EPSILON) * largest).count();
-    Some(Mat::from_fn(n, dimension, |i, j| vectors[(i, j)]))
+/// An orthonormal basis of the x with Mx = 0, as columns, whatever the sizes of the rows of M.
+fn kernel(m: &Mat<f64>) -> Option<Mat<f64>> {
+    let sizes: Vec<f64> = (0..m.nrows()).map(|i| m.row(i).norm_max()).collect();
+    let balanced = Mat::from_fn(m.nrows(), m.ncols(), |i, j| if sizes[i] > 0.0 { m[(i, j)] / sizes[i] } else { 0.0 });
+    let svd = balanced.svd().ok()?;
+    let values: Vec<f64> = (0..m.nrows().min(m.ncols())).map(|k| svd.S()[k]).collect();
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    let rank = values.iter().filter(|&&value| value > RANK * largest).count();
+    Some(svd.V().subcols(rank, m.ncols() - rank).to_owned())
 }
 
 /// Zᵢ to rounding.
 fn search(polytope: &Polytope) -> Option<Vec<Mat<f64>>> {
     let (count, b) = (polytope.len(), polytope.b(0));
-    let n = kernel(&(b * b.transpose()))?;
+    let n = kernel(&b.transpose().to_owned())?;
     let q = n.ncols();
     let triangle: Vec<(usize, usize)> = (0..q).flat_map(|i| (i..q).map(move |j| (i, j))).collect();
     let unknowns = count * triangle.len();
@@ -72,7 +73,7 @@ fn search(polytope: &Polytope) -> Option<Vec<Mat<f64>>> {
     let columns: Vec<Mat<f64>> =
         (0..unknowns).map(|k| unit(triangle[k % triangle.len()]) * &reached[k / triangle.len()]).collect();
     let equations = Mat::from_fn(q * b.ncols(), unknowns, |r, k| columns[k][(r % q, r / q)]);
-    let basis = kernel(&(equations.transpose() * &equations))?;
+    let basis = kernel(&equations)?;
     let of_basis = |vertex: usize, k: usize| {
         let mut w = Mat::<f64>::zeros(q, q);
         for (position, &(i, j)) in triangle.iter().enumerate() {
