@@ -1,13 +1,14 @@
 //! `lpv design`: synthesis alone, of a problem file or of the controllers of a scenario.
 
-use crate::designs::{self, DesignSummary};
+use crate::designs::{self, DesignSummary, Undesigned};
 use crate::failure::Failure;
 use crate::folder::{ResultFile, ResultFolder};
 use crate::output::{OutputArguments, print};
 use crate::problem::{ProblemPlan, gain, solve};
-use crate::run::required_verdicts;
+use crate::run::outcome;
 use crate::scenario::{Scenario, read_text};
 use clap::Args;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Arguments of `lpv design`.
@@ -57,21 +58,33 @@ fn run_gain(arguments: &DesignArguments, text: &str) -> Result<(), Failure> {
 }
 
 fn run_scenario(arguments: &DesignArguments) -> Result<(), Failure> {
-    let scenario = Scenario::read(&arguments.file)?;
+    let mut scenario = Scenario::read(&arguments.file)?;
     let place = arguments.output.out.clone().unwrap_or_else(|| scenario.designs_folder());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
-    let checked = designs::design_all(&scenario)?;
+    let (checked, undesigned) = designs::design_all(&mut scenario)?;
     designs::write_all(&scenario, &checked, &folder)?;
     let place = folder.finish()?;
     if arguments.output.json {
-        let summaries: Vec<DesignSummary> = checked.iter().map(|checked| checked.summary()).collect();
-        let json = serde_json::to_string_pretty(&summaries).map_err(|error| Failure::serialisation(&error))?;
+        let designed = checked.iter().map(|checked| DesignLine::Designed(checked.summary()));
+        let lines: Vec<DesignLine> = designed.chain(undesigned.iter().map(DesignLine::Undesigned)).collect();
+        let json = serde_json::to_string_pretty(&lines).map_err(|error| Failure::serialisation(&error))?;
         print(&json)?;
     } else {
         for (plan, checked) in scenario.controllers.iter().zip(&checked) {
             print(&designs::text(&plan.label, checked.verdict(), &checked.claims))?;
         }
+        for undesigned in &undesigned {
+            print(&format!("{}: not designed\n  {}\n", undesigned.label, undesigned.source))?;
+        }
         print(&place.display().to_string())?;
     }
-    required_verdicts(&scenario, &checked)
+    outcome(&scenario, &checked, undesigned)
+}
+
+/// A controller of a scenario, for machines.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum DesignLine<'a> {
+    Designed(DesignSummary<'a>),
+    Undesigned(&'a Undesigned),
 }

@@ -78,27 +78,78 @@ pub fn text(label: &str, verdict: Verdict, claims: &[Claim]) -> String {
     text
 }
 
+/// A controller of a scenario that could not be designed.
+#[derive(Serialize)]
+pub struct Undesigned {
+    /// Its place among the controllers of the file, from 0.
+    #[serde(skip)]
+    pub place: usize,
+    /// Its name.
+    pub name: String,
+    /// What it is called in reports.
+    pub label: String,
+    /// Why.
+    #[serde(rename = "not_designed", serialize_with = "as_text")]
+    pub source: SynthesisError,
+}
+
+fn as_text<S: serde::Serializer>(error: &SynthesisError, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(error)
+}
+
+impl From<Undesigned> for Failure {
+    fn from(Undesigned { name, source, .. }: Undesigned) -> Self {
+        Failure::Synthesis { controller: name, source }
+    }
+}
+
 /// Design and check every controller of the scenario, in its order. Controllers that differ only in how they are flown
-/// share one synthesis.
-pub fn design_all(scenario: &Scenario) -> Result<Vec<CheckedDesign>, Failure> {
+/// share one synthesis. Those that cannot be designed are taken out of the scenario and returned beside the others.
+///
+/// # Errors
+/// Bad input; the first failure where no controller at all is designed.
+pub fn design_all(scenario: &mut Scenario) -> Result<(Vec<CheckedDesign>, Vec<Undesigned>), Failure> {
     let mut finished: Vec<(&ControllerPlan, CheckedDesign)> = Vec::new();
-    for plan in &scenario.controllers {
+    let mut undesigned = Vec::new();
+    for (place, plan) in scenario.controllers.iter().enumerate() {
         let request = &plan.request;
         let shared = finished.iter().find(|(earlier, _)| same_but_name(earlier, plan)).map(|(_, checked)| checked);
         let checked = match shared {
-            Some(earlier) => CheckedDesign {
+            Some(earlier) => Ok(CheckedDesign {
                 design: Design { name: request.name.clone(), ..earlier.design.clone() },
                 claims: earlier.claims.clone(),
                 proofs: earlier.proofs.clone(),
                 design_seconds: 0.0,
                 check_seconds: 0.0,
-            },
-            None => design_one(scenario, plan)
-                .map_err(|source| Failure::Synthesis { controller: request.name.clone(), source })?,
+            }),
+            None => design_one(scenario, plan),
         };
-        finished.push((plan, checked));
+        match checked {
+            Ok(checked) => finished.push((plan, checked)),
+            Err(source) => {
+                undesigned.push(Undesigned { place, name: request.name.clone(), label: plan.label.clone(), source });
+            }
+        }
     }
-    Ok(finished.into_iter().map(|(_, checked)| checked).collect())
+    let designed: Vec<CheckedDesign> = finished.into_iter().map(|(_, checked)| checked).collect();
+    // what is wrong with the file is said before anything is written
+    if designed.is_empty() || undesigned.iter().any(|undesigned| is_input(&undesigned.source)) {
+        undesigned.sort_by_key(|undesigned| !is_input(&undesigned.source));
+        if !undesigned.is_empty() {
+            return Err(undesigned.swap_remove(0).into());
+        }
+    }
+    let mut places = 0..;
+    scenario.controllers.retain(|_| {
+        let place = places.next();
+        !undesigned.iter().any(|undesigned| Some(undesigned.place) == place)
+    });
+    Ok((designed, undesigned))
+}
+
+/// Whether a failure of synthesis is one of the file.
+fn is_input(error: &SynthesisError) -> bool {
+    matches!(error, SynthesisError::UnlimitedInput { .. } | SynthesisError::Problem(_))
 }
 
 /// Prove what can be proved of every design, and add it to its claims; what is only found of a frozen design, and not claimed,

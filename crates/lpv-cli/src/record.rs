@@ -1,6 +1,6 @@
 //! Results as files: trajectories as CSV, the run as JSON.
 
-use crate::designs::CheckedDesign;
+use crate::designs::{CheckedDesign, Undesigned};
 use crate::failure::Failure;
 use crate::flights::Flown;
 use crate::scenario::Scenario;
@@ -93,6 +93,9 @@ pub struct RunRecord<'a> {
     duration_s: f64,
     seconds: f64,
     controllers: Vec<ControllerRecord<'a>>,
+    /// Controllers that could not be designed.
+    #[serde(skip_serializing_if = "<[Undesigned]>::is_empty")]
+    not_designed: &'a [Undesigned],
 }
 
 /// One controller of a run.
@@ -134,7 +137,13 @@ pub struct ControllerRecord<'a> {
 
 impl<'a> RunRecord<'a> {
     /// The record of a run that took `seconds`.
-    pub fn new(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a [Flown], seconds: f64) -> Self {
+    pub fn new(
+        scenario: &'a Scenario,
+        designs: &'a [CheckedDesign],
+        not_designed: &'a [Undesigned],
+        flights: &'a [Flown],
+        seconds: f64,
+    ) -> Self {
         let controllers = (scenario.controllers.iter().zip(designs).zip(flights))
             .map(|((plan, checked), flown)| ControllerRecord {
                 name: &plan.request.name,
@@ -171,6 +180,7 @@ impl<'a> RunRecord<'a> {
             duration_s: scenario.duration_s,
             seconds,
             controllers,
+            not_designed,
         }
     }
 

@@ -1,6 +1,6 @@
 //! `report.html`: the web page with the run's data put into it.
 
-use crate::designs::{CheckedDesign, file_name};
+use crate::designs::{CheckedDesign, Undesigned, file_name};
 use crate::failure::Failure;
 use crate::flights::{Flown, while_rate};
 use crate::scenario::{ControllerPlan, Scenario};
@@ -130,10 +130,12 @@ struct EstimationData {
 pub fn html(
     scenario: &Scenario,
     designs: &[CheckedDesign],
+    undesigned: &[Undesigned],
     flights: &[Flown],
     folder: &Path,
 ) -> Result<String, Failure> {
-    let report = report(scenario, designs, flights, folder);
+    let notes = notes(scenario, designs, undesigned, flights);
+    let report = Report { notes, ..report(scenario, designs, flights, folder) };
     let data = serde_json::to_string(&report).map_err(|error| Failure::serialisation(&error))?;
     if !PAGE.contains(PLACEHOLDER) {
         return Err(Failure::Defect("the report page has no place for its data".into()));
@@ -191,7 +193,7 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
             .map(|(set_point, label)| StepData { time_s: set_point.time_s, label })
             .collect(),
         runs,
-        notes: notes(scenario, designs, flights),
+        notes: Vec::new(),
     }
 }
 
@@ -442,7 +444,7 @@ fn supervision_words(plan: &ControllerPlan) -> String {
     words
 }
 
-fn notes(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> Vec<String> {
+fn notes(scenario: &Scenario, designs: &[CheckedDesign], undesigned: &[Undesigned], flights: &[Flown]) -> Vec<String> {
     let mut notes = vec![
         "Sign convention: u = u* − sat(K(ρ)(x − x_ref)).".to_string(),
         match scenario.is_linear() {
@@ -454,6 +456,7 @@ fn notes(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> V
     if designs.iter().any(|checked| checked.proofs.is_some()) {
         notes.push("A certified step is proved for the LPV model: every claim of the design holds for every parameter value at the rate used, and this flight of the nonlinear plant stayed in the set and within the rate. The proof does not cover what linearisation leaves out; V/γ shows how much room that took.".into());
     }
+    notes.extend(undesigned.iter().map(|Undesigned { label, source, .. }| format!("{label}: not designed: {source}.")));
     for ((plan, checked), flown) in scenario.controllers.iter().zip(designs).zip(flights) {
         for claim in checked.claims.iter().chain(&flown.claims).filter(|claim| claim.verdict < Verdict::Numerical) {
             notes.push(format!("{}: {}: {}. {}", plan.label, claim.verdict.word(), claim.claim, claim.detail));

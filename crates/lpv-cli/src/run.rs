@@ -1,7 +1,7 @@
 //! `lpv run`: design → check → fly → report.
 
 use crate::contradiction;
-use crate::designs::{self, CheckedDesign};
+use crate::designs::{self, CheckedDesign, Undesigned};
 use crate::failure::Failure;
 use crate::flights::{self, Certified};
 use crate::folder::ResultFolder;
@@ -32,10 +32,10 @@ pub struct RunArguments {
 /// Do the whole job.
 pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
-    let scenario = Scenario::read(&arguments.scenario)?;
+    let mut scenario = Scenario::read(&arguments.scenario)?;
     let place = scenario.result_folder(arguments.output.out.as_deref());
     let folder = ResultFolder::begin(&place, arguments.output.force)?;
-    let mut checked = designs::design_all(&scenario)?;
+    let (mut checked, undesigned) = designs::design_all(&mut scenario)?;
     let proofs = match arguments.prove || arguments.nonlinear {
         true => designs::prove_all(&scenario, &mut checked, arguments.nonlinear),
         false => checked.iter().map(|checked| Some(checked.proofs.as_ref()?.members[0].clone())).collect(),
@@ -58,9 +58,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     for (plan, flown) in scenario.controllers.iter().zip(&flown) {
         folder.write(&trajectory_file_name(&plan.request.name), trajectory_csv(&scenario, flown).as_bytes())?;
     }
-    folder.write("report.html", report::html(&scenario, &checked, &flown, &place)?.as_bytes())?;
+    folder.write("report.html", report::html(&scenario, &checked, &undesigned, &flown, &place)?.as_bytes())?;
     let seconds = started.elapsed().as_secs_f64();
-    let record = RunRecord::new(&scenario, &checked, &flown, seconds).to_json()?;
+    let record = RunRecord::new(&scenario, &checked, &undesigned, &flown, seconds).to_json()?;
     folder.write("run.json", record.as_bytes())?;
     let place = folder.finish()?;
 
@@ -69,17 +69,25 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     } else {
         print(&format!(
             "{}\n{} in {seconds:.1} s",
-            table::comparison(&scenario, &checked, &flown),
+            table::comparison(&scenario, &checked, &undesigned, &flown),
             place.join("report.html").display()
         ))?;
     }
     let replay = format!("lpv run {} --force", arguments.scenario.display());
     contradiction::no_contradiction(&scenario, &flown, &replay)?;
-    required_verdicts(&scenario, &checked)
+    outcome(&scenario, &checked, undesigned)
+}
+
+/// Whether every controller was designed and has the verdict that the scenario requires.
+pub fn outcome(scenario: &Scenario, checked: &[CheckedDesign], undesigned: Vec<Undesigned>) -> Result<(), Failure> {
+    match undesigned.into_iter().next() {
+        Some(first) => Err(first.into()),
+        None => required_verdicts(scenario, checked),
+    }
 }
 
 /// The verdicts that the scenario requires; a refuted design is never what was asked for.
-pub fn required_verdicts(scenario: &Scenario, checked: &[CheckedDesign]) -> Result<(), Failure> {
+fn required_verdicts(scenario: &Scenario, checked: &[CheckedDesign]) -> Result<(), Failure> {
     let missed: Vec<String> = (scenario.controllers.iter().zip(checked))
         .filter_map(|(plan, checked)| {
             let (required, reached) = (plan.require.unwrap_or(Verdict::Undecided), checked.verdict());

@@ -1,6 +1,6 @@
 //! The table that ends a run.
 
-use crate::designs::CheckedDesign;
+use crate::designs::{CheckedDesign, Undesigned};
 use crate::flights::Flown;
 use crate::report::{bound_note, system_word};
 use crate::scenario::Scenario;
@@ -12,7 +12,12 @@ const HEADER: [&str; 8] =
     ["controller", "design", "cost bound (verdict)", "actual cost", "settling", "peak input", "saturated", "flight"];
 
 /// All controllers side by side.
-pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flown]) -> String {
+pub fn comparison(
+    scenario: &Scenario,
+    designs: &[CheckedDesign],
+    undesigned: &[Undesigned],
+    flights: &[Flown],
+) -> String {
     let description = scenario.plant.description();
     let unit = description.inputs.first().map_or("", |signal| signal.unit.as_str());
     let mut rows = vec![HEADER.map(str::to_owned).to_vec()];
@@ -47,7 +52,16 @@ pub fn comparison(scenario: &Scenario, designs: &[CheckedDesign], flights: &[Flo
             },
         ]);
     }
-    format_rows(&rows)
+    for Undesigned { place, label, .. } in undesigned {
+        let mut row = vec![label.clone(), "none".into()];
+        row.resize(HEADER.len() - 1, "-".into());
+        row.push("not designed".into());
+        // where it stands in the file, after the header
+        rows.insert(place + 1, row);
+    }
+    let reason = |Undesigned { label, source, .. }: &Undesigned| format!("{label}: {source}\n");
+    let reasons: String = undesigned.iter().map(reason).collect();
+    format_rows(&rows) + &reasons
 }
 
 /// Rows with columns aligned: the first three and the last to the left, numbers to the right.

@@ -360,11 +360,18 @@ fn high_gain_of_many_inputs() {
     refused(text, 2, &["scenario.toml", "controller[3].method", "up to 10 inputs", "\"slpvqr\""]);
 }
 
+/// [`DOUBLE_INTEGRATOR`] with its high gains alone, sampled too slowly for any of them.
+fn too_slow() -> String {
+    let text = edited(DOUBLE_INTEGRATOR, "sample_time_s = 0.01\nrecord_interval_s = 0.05\n", "sample_time_s = 1.5\n");
+    let (head, controllers) = text.split_once("[[controller]]").unwrap();
+    let (_, high_gains) = controllers.split_once("[[controller]]\nname = \"high-gain\"").unwrap();
+    format!("{head}[[controller]]\nname = \"high-gain\"{high_gains}")
+}
+
 /// What cannot be reached is no bad input: exit code 3, and what to change.
 #[test]
 fn infeasible_problems() {
-    let text = edited(DOUBLE_INTEGRATOR, "sample_time_s = 0.01", "sample_time_s = 1.5");
-    let text = edited(&text, "record_interval_s = 0.05\n", "");
+    let text = too_slow();
     refused(text, 3, &["controller \"high-gain\"", "sample time of 1.5 s", "sample faster"]);
 }
 
@@ -402,12 +409,12 @@ fn output_folders() {
 fn failed_runs_keep_the_earlier_result() {
     let place = Place::with(DOUBLE_INTEGRATOR);
     place.succeed("run scenario.toml");
-    for (from, to, code) in [
-        ("gamma = 2\nnoise", "gamma = -2\nnoise", 2),
-        ("record_interval_s = 0.05", "seed_ = 1", 2),
-        ("sample_time_s = 0.01\nrecord_interval_s = 0.05", "sample_time_s = 1.5", 3),
+    for (text, code) in [
+        (edited(DOUBLE_INTEGRATOR, "gamma = 2\nnoise", "gamma = -2\nnoise"), 2),
+        (edited(DOUBLE_INTEGRATOR, "record_interval_s = 0.05", "seed_ = 1"), 2),
+        (too_slow(), 3),
     ] {
-        place.write("scenario.toml", edited(DOUBLE_INTEGRATOR, from, to));
+        place.write("scenario.toml", text);
         let before = place.files();
         let ended = place.lpv("run scenario.toml --force");
         ended.refuses(code, &[]);

@@ -418,3 +418,62 @@ fn a_run_proves_what_it_flies() {
         assert!(rate["detail"].as_str().unwrap().contains("rad/s"), "{rate}");
     }
 }
+
+/// One controller that cannot be designed takes nothing from the others: they fly, its row says why, and the exit code is its own.
+#[test]
+fn one_controller_that_cannot_be_designed() {
+    let impossible = "method = \"high-gain-slpvqr\"\nhigh_gain = { gain_margin = 1e12 }\ngamma = 2\n\n[[controller]]\nname = \"filtered\"";
+    let text = DOUBLE_INTEGRATOR.replacen(
+        "method = \"high-gain-slpvqr\"\ngamma = 2\n\n[[controller]]\nname = \"filtered\"",
+        impossible,
+        1,
+    );
+    let place = Place::with(&text);
+    let ended = place.lpv("run scenario.toml");
+    assert_eq!(ended.code, 3, "{}", ended.err);
+    assert!(ended.err.contains("\"high-gain\"") && ended.err.contains("gain_margin"), "{}", ended.err);
+    assert!(ended.out.contains("not designed") && ended.out.contains("High gain, γ = 2: no gain"), "{}", ended.out);
+    let record = place.json("out/cart/run.json");
+    let names: Vec<&Value> = record["controllers"].as_array().unwrap().iter().map(|of| &of["name"]).collect();
+    assert_eq!(names, ["regulator", "saturated", "filtered"]);
+    assert_eq!(record["not_designed"][0]["name"], "high-gain");
+    let page = fs::read_to_string(place.path("out/cart/report.html")).unwrap();
+    let notes = report_data(&page)["notes"].to_string();
+    assert!(notes.contains("High gain, γ = 2: not designed"), "{notes}");
+    let designs: Value = serde_json::from_str(&place.lpv("design scenario.toml -o designs --json").out).unwrap();
+    assert_eq!(designs.as_array().unwrap().len(), 4);
+    assert!(designs[3]["not_designed"].as_str().unwrap().contains("sample faster"));
+
+    // where none is left there is nothing to fly
+    let none = text
+        .replace("method = \"lpvqr\"", "method = \"high-gain-slpvqr\"\ngamma = 2")
+        .replace("method = \"slpvqr\"", "method = \"high-gain-slpvqr\"")
+        .replace("gamma = 2\nnoise", "gamma = 2\nhigh_gain = { gain_margin = 1e12 }\nnoise");
+    let none = none.replace(
+        "method = \"high-gain-slpvqr\"\ngamma = 2\n\n",
+        "method = \"high-gain-slpvqr\"\nhigh_gain = { gain_margin = 1e12 }\ngamma = 2\n\n",
+    );
+    let place = Place::with(&none);
+    place.lpv("run scenario.toml").refuses(3, &["gain_margin"]);
+    assert!(place.list("out").is_empty());
+}
+
+/// The thesis's scenario at 27 g: forces of 0.1 N, inertias of 1e-5 kg m².
+#[test]
+fn a_vehicle_of_27_grams() {
+    let text = include_str!("../cases/public/crazyflie.toml");
+    let text = text.replace("grid_points = 32", "grid_points = 4").replace("duration_s = 75.0", "duration_s = 36.0");
+    let place = Place::with(text);
+    place.succeed("run scenario.toml");
+    let record = place.json("out/crazyflie/run.json");
+    let controllers = record["controllers"].as_array().unwrap();
+    assert_eq!(controllers.len(), 7);
+    for controller in controllers {
+        // the saturated designs are good as far as they are checked; the others promise nothing at these limits
+        let is_saturated = controller["method"] != "lpvqr";
+        assert!(
+            !is_saturated || controller["verdict"] == "numerical" || controller["verdict"] == "proved",
+            "{controller}"
+        );
+    }
+}

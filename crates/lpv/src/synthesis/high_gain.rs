@@ -24,11 +24,11 @@
 
 use super::back_off::mixtures_hold;
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
-use super::slpvqr::not_definite;
+use super::slpvqr::{self, not_definite};
 use super::{CostWeights, FrozenDesign, RateBounded, SynthesisError};
 use crate::math::eigen::spectral_radius;
 use crate::math::hold::discretize;
-use crate::math::matrix::{inverse_spd, symmetric_part, trace};
+use crate::math::matrix::{inverse_spd, is_diagonal, symmetric_part, trace};
 use crate::math::{Mat, lyapunov, riccati};
 use crate::model::FrozenModel;
 use lmi::{Expr, Problem};
@@ -72,13 +72,20 @@ pub(super) fn mixture(vertex: usize, l: &Expr, m: &Expr) -> Expr {
     selector(1) * l + selector(0) * m
 }
 
-/// Theorem 5.4 at one parameter value: all 2^m mixtures as inequalities.
+/// Theorem 5.4 at one parameter value. With diagonal R its optimum is that of Theorem 5.3, with L = M (see the module); else all 2^m mixtures
+/// are inequalities.
 pub(super) fn segment(
     model: &FrozenModel,
     weights: &CostWeights,
     sigma: &[f64],
     gamma: f64,
 ) -> Result<Segment, SynthesisError> {
+    if is_diagonal(&weights.r) {
+        let low = slpvqr::frozen(model, weights, sigma, gamma)?;
+        let high = InverseWeights::new(weights).r * model.b.transpose() * &low.p;
+        let FrozenDesign { rho, gain, p, trace_y, iterations, .. } = low;
+        return Ok(Segment { rho, low: gain, high, trace_y, p, p_rate: None, iterations });
+    }
     let (n, inputs) = (model.a.nrows(), model.b.ncols());
     let inverse = InverseWeights::new(weights);
     let mut problem = Problem::new();
