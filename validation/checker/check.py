@@ -85,17 +85,17 @@ def check_premises(claims, claim, design):
     falls = ["definite", "unsaturated"] if limited else ["definite"]
     needed = {"definite": [], "sampled": [], "unsaturated": ["definite"], "decrease": falls}
     # what V falls under for every v between Fx and Kx, it falls under for v = Kx
-    needed |= {"cost": [*falls, "decrease"], "kept": falls, "sampled": ["kept"] if premises else []}
+    needed |= {"cost": [*falls, "decrease"], "kept": falls, "sampled-cost": falls, "sampled": ["kept"] if premises else []}
     require([premise["kind"] for premise in premises] == needed[kind], "it does not rest on what it has to")
     require(all(premise["design"] == claim["design"] for premise in premises), "a premise is of another design")
     if kind not in ("definite", "sampled"):
         require(claim["level"] > 0 if limited else claim["level"] is None, "it needs a level, or none")
         require(all(p["level"] == claim["level"] for p in premises[1:]), "a premise is about another level")
-    require(kind != "cost" or claim["factor"] > 0, "the factor is not positive")
+    require(kind not in ("cost", "sampled-cost") or claim["factor"] > 0, "the factor is not positive")
     if kind in ("decrease", "cost") and isinstance(design, Design):
         require(design.parameter is not None or claim["rate"] == 0, "there is no parameter that moves")
         require(claim["rate"] >= 0 and (kind != "cost" or premises[-1]["rate"] >= claim["rate"]), "the rate is wrong")
-    is_sampled = kind in ("sampled", "kept")
+    is_sampled = kind in ("sampled", "kept", "sampled-cost")
     require(not is_sampled or claim["sample_time_s"] == design.line["sample_time_s"] > 0, "the sample time is wrong")
 
 
@@ -104,10 +104,11 @@ def check_cells(design, claim):
     groups, variants = claim["groups"], design.limited if claim["kind"] == "unsaturated" else [None]
     if claim["kind"] == "sampled" and claim["premises"]:
         return require(not groups, "cells are of no use beside a premise")
-    if claim["kind"] in ("decrease", "cost") and design.saturating:
+    if claim["kind"] in ("decrease", "cost", "sampled-cost") and design.saturating:
         chosen = itertools.product((False, True), repeat=len(design.saturating))
         all_rows = [list(itertools.compress(design.saturating, bits)) for bits in chosen]
-        variants = ["rows"] if groups[0]["variant"] == "rows" else all_rows
+        by_rows = claim["kind"] != "sampled-cost" and groups[0]["variant"] == "rows"
+        variants = ["rows"] if by_rows else all_rows
     expected = itertools.product(range(design.pieces), variants)
     require(sorted(map(str, expected)) == sorted(str((g["piece"], g["variant"])) for g in groups), "cells are missing")
     for group in groups:
@@ -136,6 +137,9 @@ def prove_group(design, claim, group, floor):
     if kind == "kept":
         families = design.kept(piece, claim["sample_time_s"], claim["between"])
         return all(family.is_definite_on(cells) for family in families)
+    if kind == "sampled-cost":
+        m = design.sampled_cost(variant, claim["sample_time_s"], claim["factor"])
+        return is_definite(m.entries(), m.nrows())
     if kind == "definite":
         return design.definite(piece, floor).is_definite_on(cells)
     if kind == "unsaturated":
@@ -219,6 +223,8 @@ def statement(claim):
         "unsaturated": f"the low gain does not saturate{on}",
         "decrease": f"V decreases{on} while the parameter's rate is at most {claim.get('rate')!r}",
         "cost": f"the cost is at most {claim.get('factor')!r} V(x(0)){on} while it is at most {claim.get('rate')!r}",
+        "sampled-cost": f"the cost of the saturated loop sampled at T = {claim.get('sample_time_s')!r} s is at most "
+        f"{claim.get('factor')!r} V(x(0)){on}",
         "sampled": f"the loop sampled at T = {claim.get('sample_time_s')!r} s is stable at every fixed parameter",
         "kept": f"the saturated loop sampled at T = {claim.get('sample_time_s')!r} s stays{on} at every fixed parameter, "
         + ("at the samples and between them" if claim.get("between") else "at the samples"),

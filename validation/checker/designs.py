@@ -5,7 +5,7 @@ from fractions import Fraction
 from functools import reduce
 from operator import add
 
-from flint import arb, arb_mat
+from flint import arb, arb_mat, ctx
 
 from functions import Family, Sum, ball, blocks, bordered, function, require, unit
 
@@ -259,6 +259,28 @@ class Design:
             top = zip(flow.tolist(), side.transpose().tolist())
             return sum((left + right for left, right in itertools.chain(top, zip(side.tolist(), corner.tolist()))), [])
         return Family(self.place(piece), [reduce(add, self.held(time)) @ (self.a - self.b @ self.schedule(piece))], assemble)
+
+    def sampled_cost(self, flying, time, factor):
+        """factor (P - MᵀPM) - ZᵀWZ of one mixture, v = Sx held for T: over a period V falls by the cost, or more.
+
+        z(τ) = e^{Gτ}Zx for z = (x, v), G = [A, -B; 0, 0], Z = [I; S]; M is the upper part of e^{GT}Z, and the cost is
+        zᵀWz, W = ∫₀ᵀ e^{Gᵀτ}Ce^{Gτ} dτ, C = [Q, 0; 0, R], which Van Loan's exponential has beside e^{GT}: e^{XT} =
+        [·, N; 0, e^{GT}], X = [-Gᵀ, C; 0, G], W = (e^{GT})ᵀN. As a function of v the difference is concave, so that it
+        is least at a mixture.
+        """
+        require(self.parameter is None and not self.inverse, "it is of a plant without a parameter, and of P")
+        n, size, (k, low) = self.n, self.n + self.m, self.gains(0)
+        zero, zeros = lambda rows, columns: Sum((rows, columns), {}), Sum((size, size), {})
+        s = blocks([[(k if i not in self.saturating or i in flying else low).rows([i])] for i in range(self.m)])
+        g = blocks([[self.a, self.b.times(-1)], [zero(self.m, n), zero(self.m, self.m)]])
+        c = blocks([[Sum.constant(self.q), zero(n, self.m)], [zero(self.m, n), Sum.constant(self.r)]])
+        with ctx.workprec(256):
+            whole = (blocks([[g.t.times(-1), c], [zeros, g]]).at(arb(0)) * arb(time)).exp().tolist()
+            z, p = blocks([[unit(n)], [s]]).at(arb(0)), self.lyapunov.at(arb(0))
+            flow, beside = (arb_mat([row[size:] for row in rows]) for rows in (whole[size:], whole[:size]))
+            next_state = arb_mat((flow * z).tolist()[:n])
+            cost = z.transpose() * flow.transpose() * beside * z
+            return (p - next_state.transpose() * p * next_state) * arb(factor) - cost
 
 
 class Polytope:

@@ -38,6 +38,7 @@ for problem in double-integrator pendulum quadrotor-arc two-masses; do
 done
 # the smaller records, of every kind that there is
 "$python" "$here/edits.py" double-integrator-high-gain-60.jsonl=double-integrator/design-high-gain-60.json \
+    quadrotor-lpvqr-unbounded.jsonl=quadrotor/design-lpvqr-unbounded.json \
     quadrotor-lpvqr.jsonl=quadrotor/design-lpvqr.json quadrotor-slpvqr-1.jsonl=quadrotor/design-slpvqr-1.json \
     quadrotor-high-gain-20-rate.jsonl=quadrotor/design-high-gain-20-rate.json \
     quadrotor-governed-moving.jsonl=quadrotor-governed/design-moving.json \
