@@ -481,7 +481,7 @@ def refusal(edit):
         file.write(text)
         file.flush()
         try:
-            check.check(file.name, design, jobs=1)
+            check.check(file.name, design)
         except Exception as error:
             return name, os.path.basename(path), f"{error}" if isinstance(error, check.Refused) else repr(error)
     return name, os.path.basename(path), ""
