@@ -37,7 +37,7 @@ KINDS = {
     "cost": ([*FALLS, "decrease"], Loop.falling, "the cost is at most factor V(x(0)) from V <= level up to the rate"),
     "kept": (FALLS, Design.kept, "the saturated loop, sampled, stays on V <= level at every fixed parameter"),
     "sampled": ([], Design.sampled, "the loop, sampled, is stable at every fixed parameter"),
-    "sampled-cost": (FALLS, Design.sampled_cost, "the saturated loop, sampled, costs at most factor V(x(0)), V <= level"),
+    "sampled-cost": (FALLS, Design.sampled_cost, "from V <= level the loop, sampled, costs at most factor V(x(0))"),
     "motion": ([], None, "the reference moves as the model does, each state by up to farthest"),
 }
 NUMBERS = ("level", "factor", "rate", "sample_time_s", "between", "farthest")

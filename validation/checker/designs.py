@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from flint import arb, arb_mat, ctx
 
-from functions import Family, Sum, alone, blocks, diagonal, function, less_squares, require
+from functions import Family, Sum, alone, blocks, diagonal, function, less_squares, require, unit
 
 JOINED = 6  # cells that carry nothing are taken as one, so many at a time
 SERIES = 24  # terms of the exponential series
@@ -62,14 +62,14 @@ def plant_of(plant):
 
 
 def after_a_sample(h, w, time):
-    """By Schur, with H = PE (or EY): V is smaller at x + τEx than at x, for every τ ≤ T, if this is positive definite."""
+    """By Schur, with H = PE (or EY): where it is positive definite, V(x + τEx) < V(x) for every τ ≤ T."""
     return blocks([[(h + h.transpose()) * -1, h.transpose() * time], [h * time, w * time]])
 
 
 class Loop:
     """ẋ = Ax + Bu, u = -Kx within limits, and V = xᵀPx or, if `inverse`, V = xᵀY⁻¹x: of designs and polytopes.
 
-    The method of a theorem yields what has to be definite on a piece of the parameter's range: parts and end of a `Family`.
+    The method of a theorem yields what has to be definite on a piece of the parameter's range, for `Family`.
     """
 
     parameter, pieces, vertices, low, omega = None, 1, 0, arb(0), arb(0)
@@ -128,7 +128,7 @@ class Loop:
 
     def bounded(self, claim, piece, variant):
         """Y ⪰ floor I, which is P ⪯ I/floor."""
-        one, floor = Sum.constant(diagonal([1] * self.n)), claim["floor"]
+        one, floor = Sum.constant(unit(self.n)), claim["floor"]
         yield [self.lyapunov - one.times(floor) if self.inverse else one - self.lyapunov.times(floor)], alone
 
     def unsaturated(self, claim, piece, i):
@@ -224,7 +224,7 @@ class Design(Loop):
         """P (and F) of the points is that of the function up to rounding: PY = I, or P and F have its harmonics."""
         if self.inverse:
             for point in self.points:
-                off = self.lyapunov.at(arb(point["rho"])) * arb_mat(point["p"]) - diagonal([1] * self.n)
+                off = self.lyapunov.at(arb(point["rho"])) * arb_mat(point["p"]) - unit(self.n)
                 close(off, 1, 1e-6, "P of a point is not the inverse of Y")
         elif self.parameter is not None:
             pairs, count = [(self.lyapunov, "p"), (self.auxiliary, "auxiliary_gain")], len(self.points)
@@ -263,7 +263,7 @@ class Design(Loop):
     def held(self, time):
         """(AT)^k/(k + 1)!, k = 0, 1, …, with the rest of the series as the last: x(T) = x + TΦ(Ax + Bu) while u is held
         for T, where Φ is their sum."""
-        terms = [Sum.constant(diagonal([1] * self.n))]
+        terms = [Sum.constant(unit(self.n))]
         while terms[-1].terms and len(terms) <= SERIES:
             terms.append((terms[-1] @ self.a).times(arb(time) / (len(terms) + 1)))
         if terms[-1].terms:  # Σ_{k > N} a^k/(k + 1)! ≤ 2 a^{N+1}/(N + 2)! for the norm a ≤ N/2 of AT
@@ -320,7 +320,7 @@ class Design(Loop):
             c = blocks([[q, arb_mat(n, m)], [arb_mat(m, n), r]])
             x = blocks([[g.transpose() * -1, c], [arb_mat(n + m, n + m), g]])
             right = [row[n + m :] for row in (x * arb(claim["sample_time_s"])).exp().tolist()]
-            z = blocks([[diagonal([1] * n)], [s]])
+            z = blocks([[unit(n)], [s]])
             beside, end = arb_mat(right[: n + m]) * z, arb_mat(right[n + m :]) * z
             moved = arb_mat(end.tolist()[:n])
             left = (p - moved.transpose() * p * moved) * arb(claim["factor"]) - end.transpose() * beside

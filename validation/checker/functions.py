@@ -1,4 +1,5 @@
 """Matrices as functions of the parameter on a piece of its range, and the proof that they are positive definite."""
+import functools
 import itertools
 import math
 from operator import mul
@@ -25,6 +26,11 @@ def is_zero(matrix):
 
 def diagonal(numbers):
     return arb_mat([[x if i == j else 0 for j in range(len(numbers))] for i, x in enumerate(numbers)])
+
+
+@functools.cache
+def unit(n):
+    return diagonal([1] * n)
 
 
 def blocks(grid):
@@ -144,7 +150,7 @@ def is_definite(m, t=None):
     t = inverse_factor(m) if t is None else t
     if t is None:
         return False
-    off = (t * m * t.transpose() - diagonal([1] * m.nrows())).tolist()
+    off = (t * m * t.transpose() - unit(m.nrows())).tolist()
     return all(sum(map(arb.abs_upper, row)) < 1 for row in off)
 
 
@@ -152,26 +158,31 @@ class Family:
     """A symmetric matrix for every t of a piece: `finish`, which is concave, of `parts` and of what a cell carries."""
 
     def __init__(self, place, parts, finish):
-        self.place, self.parts, self.finish = place, parts, finish
-        self.bends = [part.slope(1, place[1]).slope(1, place[1]) for part in parts]
+        self.place, self.finish, self.shapes = place, finish, [part.shape for part in parts]
+        bends = [part.slope(1, place[1]).slope(1, place[1]) for part in parts]
+        self.itself, self.bend = self.table(parts), self.table(bends)
 
-    def values(self, parts, balls):
-        """The matrices of `parts` at every t of `balls`, ρ = start + ωt."""
-        (start, omega), keys = self.place, sorted({ONE}.union(*(part.terms for part in parts)))
+    def table(self, parts):
+        """All keys of the parts, and of each a row with the coefficients of all entries."""
+        keys = sorted({ONE}.union(*(part.terms for part in parts)))
         entries = lambda part, key: part.terms[key].entries() if key in part.terms else [0] * mul(*part.shape)
-        coefficients = arb_mat([sum((entries(part, key) for part in parts), []) for key in keys])
-        scalars, ends = [], list(itertools.accumulate((mul(*part.shape) for part in parts), initial=0))
+        return keys, arb_mat([sum((entries(part, key) for part in parts), []) for key in keys])
+
+    def values(self, table, balls):
+        """The matrices of the parts of a table at every t of `balls`, ρ = start + ωt."""
+        (start, omega), (keys, coefficients), scalars = self.place, table, []
         for t in balls:
             powers = {j: t**j for j, *_ in keys}
             waves = {k: ((start + omega * t) * k).sin_cos() for _, k, *_ in keys}
             scalars.append([powers[j] * waves[k][1 - s] for j, k, s, _ in keys])
+        ends = list(itertools.accumulate(itertools.starmap(mul, self.shapes), initial=0))
         rows = (arb_mat(scalars) * coefficients).tolist()
-        return [[arb_mat(*p.shape, row[a:b]) for p, a, b in zip(parts, ends, ends[1:])] for row in rows]
+        return [[arb_mat(*shape, row[a:b]) for shape, a, b in zip(self.shapes, ends, ends[1:])] for row in rows]
 
     def is_definite_on(self, cells, halvings=HALVINGS):
         """Whether it is on every cell [a, b, extra] of t; cells follow each other."""
-        ends = self.values(self.parts, [arb(cells[0][0]), *(arb(b) for _, b, _ in cells)])
-        bends = self.values(self.bends, [arb(a).union(arb(b)) for a, b, _ in cells])
+        ends = self.values(self.itself, [arb(cells[0][0]), *(arb(b) for _, b, _ in cells)])
+        bends = self.values(self.bend, [arb(a).union(arb(b)) for a, b, _ in cells])
         for (a, b, extra), *two, bend in zip(cells, ends, ends[1:], bends):
             share, middle = arb(-1, 1) * (arb(b) - a) ** 2 / 16, a + (b - a) / 2  # [-(b - a)²/8, 0]
             both = [self.finish([x + y * share for x, y in zip(end, bend)], extra) for end in two]

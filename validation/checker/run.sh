@@ -3,6 +3,7 @@
 #
 #     validation/checker/run.sh [LPV]           the program [default: target/release/lpv]
 #     PYTHON=python3.11 OUT=folder …            needs python-flint (requirements.txt)
+#     RUNS=folder …                             where scenarios were run with this program already
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(cd "$here/../.." && pwd)
@@ -12,8 +13,18 @@ out=${OUT:-$root/out/checker}
 mkdir -p "$out"
 cd "$out"
 
-for scenario in double-integrator quadrotor quadrotor-governed; do
-    "$lpv" run "$root/scenarios/$scenario.toml" --out "$scenario" --force > "$scenario.txt"
+# Scenarios, unless RUNS is a folder in which they were run.
+cat > scenario.sh <<'END'
+set -eu
+if test -d "$3/$4"; then
+    rm -rf "$4" && cp -r "$3/$4" "$4"
+else
+    "$1" run "$2/scenarios/$4.toml" --out "$4" --force > "$4.txt"
+fi
+END
+scenarios="double-integrator quadrotor quadrotor-governed"
+printf '%s\n' $scenarios | xargs -P "$(nproc)" -n 1 sh scenario.sh "$lpv" "$root" "${RUNS:-none}"
+for scenario in $scenarios; do
     for design in "$scenario"/design-*.json; do
         name=$(basename "$design" .json)
         # the same design again, for an estimator, is left out
