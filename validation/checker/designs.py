@@ -93,8 +93,10 @@ class Loop:
 
     def variants(self, kind):
         """Of a claim: inputs that could reach a limit, or lists of inputs that fly K while others fly F."""
-        if kind == "unsaturated" or kind not in ("decrease", "cost", "sampled-cost") or not self.saturating:
-            return self.limited if kind == "unsaturated" else [None]
+        if kind == "unsaturated":
+            return self.limited
+        if kind not in ("decrease", "cost", "sampled-cost") or not self.saturating:
+            return [None]
         chosen = itertools.product((False, True), repeat=len(self.saturating))
         return [list(itertools.compress(self.saturating, bits)) for bits in chosen]
 
@@ -166,26 +168,28 @@ class Design(Loop):
     """A plant and the design for it."""
 
     def __init__(self, line):
-        controller, self.points, self.pieces, moving = (
-            line["controller"], line["points"], line["pieces"], line.get("rate_bounded"))
+        controller, self.points, self.pieces = line["controller"], line["points"], line["pieces"]
         a, b, self.trim, self.parameter = plant_of(line["plant"])
         self.start(line, a, b)
         require(controller["operating_input"] == self.trim, "the operating input is not that of the plant")
         require(controller["scheduling_state"] == self.parameter, "the scheduling state is not that of the plant")
+        constant = lambda key: {"basis": [{"function": "constant"}], "coefficients": [self.points[0][key]]}
+        lyapunov, auxiliary = constant("p"), constant("auxiliary_gain")
         if self.parameter is None:
             require(self.pieces == len(self.points) == 1, "pieces are wrong")
         else:  # ρ = -π + ω t, t from 0 to the number of pieces, once around the circle
             require(0 < self.pieces <= 4096, "pieces are wrong")
             self.low, self.omega = arb(-math.pi), 2 * arb.pi() / self.pieces
-        constant = lambda key: {"basis": [{"function": "constant"}], "coefficients": [self.points[0][key]]}
-        joined = line["joined"] if self.parameter is not None and not moving else {
-            "p": constant("p"), "auxiliary": constant("auxiliary_gain")}
-        lyapunov, auxiliary = (moving["y"], moving["l"]) if moving else (joined["p"], joined["auxiliary"])
+        self.inverse = line.get("rate_bounded") is not None
+        if self.inverse:
+            lyapunov, auxiliary = line["rate_bounded"]["y"], line["rate_bounded"]["l"]
+        elif self.parameter is not None:
+            lyapunov, auxiliary = line["joined"]["p"], line["joined"]["auxiliary"]
         for rows in [*lyapunov["coefficients"], *(point["p"] for point in self.points)]:
             symmetric(rows, self.n, "a matrix of the Lyapunov function")
         has_auxiliary = {point["auxiliary_gain"] is not None for point in self.points}
         require(len(has_auxiliary) == 1, "some auxiliary gains are missing")
-        self.inverse, self.lyapunov = moving is not None, function(lyapunov, (self.n, self.n))
+        self.lyapunov = function(lyapunov, (self.n, self.n))
         self.auxiliary = function(auxiliary, (self.m, self.n)) if True in has_auxiliary else None
         self.check_schedule(controller["schedule"])
         self.check_points()
