@@ -75,6 +75,7 @@ def read(path):
     require(lines == designs + claims and claims, "designs come first, then claims")
     for number, line in enumerate(designs):
         require(line.get("design", line.get("polytope")) == number, "designs are not numbered in turn")
+        require(line.get("inner_of") in [None, *range(number)], "a design is a member of none that stands before it")
     for number, line in enumerate(claims):
         require(line["claim"] == number and 0 <= line["design"] < len(designs), "claims are not numbered in turn")
         require(all(0 <= premise < number for premise in line["premises"]), "a premise is no earlier claim")

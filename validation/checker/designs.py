@@ -232,8 +232,9 @@ class Design(Loop):
                 close(off, 1, 1e-6, "P of a point is not the inverse of Y")
         elif self.parameter is not None:
             pairs, count = [(self.lyapunov, "p"), (self.auxiliary, "auxiliary_gain")], len(self.points)
-            for (total, key), k, s in itertools.product(pairs, range((count - 1) // 2 + 1), (0, 1)):
+            for (total, key), k, s in itertools.product(pairs, range((count + 1) // 2), (0, 1)):
                 if total is not None:
+                    require(all(2 * order < count for _, order, *_ in total.terms), "a harmonic is of no point")
                     waves = [(arb(p["rho"]) * k).sin_cos()[1 - s] * (2 if k else 1) / count for p in self.points]
                     given, zero = [arb_mat(p[key]) for p in self.points], arb_mat(*total.shape)
                     off = sum((p * w for p, w in zip(given, waves)), zero) - total.terms.get((0, k, s, ()), zero)
