@@ -1,17 +1,22 @@
 """Designs and polytopes of a record: the plant's linearisation, the closed loop, and the matrices of each theorem."""
+import functools
 import itertools
 import math
 from fractions import Fraction
-from functools import reduce
-from operator import add
 
-from flint import arb, arb_mat
+from flint import arb, arb_mat, ctx
 
-from functions import Family, Sum, ball, blocks, bordered, function, require, unit
+from functions import Family, Sum, alone, blocks, diagonal, function, less_squares, require, unit
 
+JOINED = 6  # cells that carry nothing are taken as one, so many at a time
 SERIES = 24  # terms of the exponential series
 # A quotient of parameters is meant exactly or as the double nearest to it: both are in this ball around it.
 ROUNDED = arb(1, 2.0**-50)
+QUADROTOR = "mass_kg gravity_m_s2 inertia_x_kg_m2 inertia_y_kg_m2 inertia_z_kg_m2 arm_length_m drag_to_lift_m".split()
+# ẋ₁ = x₂, ẋ₂ = u; of the pendulum ẋ₂ = -0.1 x₂ + sin x₁ + u
+PLANTS = {"double-integrator": ([[0, 1], [0, 0]], [[0], [1]]), "pendulum": ([[0, 1], [1, -0.1]], [[0], [1]])}
+# The cubic through the knots -1, 0, 1, 2: of each the weight, in sixths of 1, t, t², t³.
+CUBIC = {-1: (0, -2, 3, -1), 0: (6, -3, -6, 3), 1: (0, 6, 3, -3), 2: (0, -1, 0, 1)}
 
 
 def symmetric(rows, size, what):
@@ -31,10 +36,9 @@ def semidefinite(rows, strictly):
     return True
 
 
-def check_weights(weights, n, m):
-    symmetric(weights["q"], n, "Q"), symmetric(weights["r"], m, "R")
-    require(semidefinite(weights["q"], False) and semidefinite(weights["r"], True), "Q is not ⪰ 0, or R not ≻ 0")
-    return weights["q"], weights["r"]
+def close(off, size, most, why):
+    """Whether all entries of a ball matrix are below `most`, relative to a matrix of this size."""
+    require(all(x.abs_upper() < most * size for x in off.entries()), why)
 
 
 def plant_of(plant):
@@ -43,286 +47,319 @@ def plant_of(plant):
         # v̇ = (sin θ, -sin φ cos θ, cos φ cos θ) ΣF/m - (0, 0, g), ṙ = v,
         # ṗ = (F₂ - F₄)ℓ/I_x - …qr, q̇ = (F₃ - F₁)ℓ/I_y - …pr, ṙ = (F₁ - F₂ + F₃ - F₄)d/I_z - …pq,
         # φ̇ = (p cos ψ - q sin ψ)/cos θ, θ̇ = p sin ψ + q cos ψ, ψ̇ = r - (p cos ψ - q sin ψ) tan θ; at rest F = mg/4
-        axes = [f"inertia_{axis}_kg_m2" for axis in "xyz"]
-        keys = ["mass_kg", "gravity_m_s2", *axes, "arm_length_m", "drag_to_lift_m"]
-        require(all(plant[key] > 0 for key in keys), "a parameter of the quadrotor is not positive")
-        mass, g, ix, iy, iz, arm, drag = (arb(plant[key]) for key in keys)
+        require(all(plant[key] > 0 for key in QUADROTOR), "a parameter of the quadrotor is not positive")
+        mass, g, ix, iy, iz, arm, drag = (arb(plant[key]) for key in QUADROTOR)
         g, by_mass, p, q, r = (ROUNDED * x for x in (g, 1 / mass, arm / ix, arm / iy, drag / iz))
-        still = {(3, 0): arb(1), (4, 1): arb(1), (5, 2): arb(1), (11, 8): arb(1), (0, 10): g, (1, 9): -g}
-        cosine, sine = {(9, 6): arb(1), (10, 7): arb(1)}, {(9, 7): arb(-1), (10, 6): arb(1)}
-        b = {(2, i): by_mass for i in range(4)}
+        still = {(3, 0): 1, (4, 1): 1, (5, 2): 1, (11, 8): 1, (0, 10): g, (1, 9): -g}
+        cosine, sine = {(9, 6): 1, (10, 7): 1}, {(9, 7): -1, (10, 6): 1}
+        b = {(2, 0): by_mass, (2, 1): by_mass, (2, 2): by_mass, (2, 3): by_mass}
         b |= {(6, 1): p, (6, 3): -p, (7, 2): q, (7, 0): -q, (8, 0): r, (8, 1): -r, (8, 2): r, (8, 3): -r}
         fill = lambda entries, columns: arb_mat([[entries.get((i, j), 0) for j in range(columns)] for i in range(12)])
-        a = {(0, 0, 0): fill(still, 12), (0, 1, 0): fill(cosine, 12), (0, 1, 1): fill(sine, 12)}
-        hover = plant["mass_kg"] * plant["gravity_m_s2"] / 4
-        return Sum((12, 12), a), Sum((12, 4), {(0, 0, 0): fill(b, 4)}), [hover] * 4, 11
-    if plant["name"] == "linear":
-        return Sum.constant(plant["A"]), Sum.constant(plant["B"]), [0.0] * len(plant["B"][0]), None
-    # ẋ₁ = x₂, ẋ₂ = u; of the pendulum ẋ₂ = -0.1 x₂ + sin x₁ + u
-    require(plant["name"] in ("pendulum", "double-integrator"), "the plant is not known")
-    row = [1.0, -0.1] if plant["name"] == "pendulum" else [0.0, 0.0]
-    return Sum.constant([[0.0, 1.0], row]), Sum.constant([[0.0], [1.0]]), [0.0], None
+        a = [((0, 0, 0, ()), fill(still, 12)), ((0, 1, 0, ()), fill(cosine, 12)), ((0, 1, 1, ()), fill(sine, 12))]
+        return Sum((12, 12), a), Sum.constant(fill(b, 4)), [plant["mass_kg"] * plant["gravity_m_s2"] / 4] * 4, 11
+    a, b = (plant["A"], plant["B"]) if plant["name"] == "linear" else PLANTS[plant["name"]]
+    return Sum.constant(a), Sum.constant(b), [0.0] * len(b[0]), None
 
 
-class Design:
-    """The closed loop of a plant and a design, and V = xᵀPx or xᵀY⁻¹x."""
+def after_a_sample(h, w, time):
+    """By Schur, with H = PE (or EY): where it is positive definite, V(x + τEx) < V(x) for every τ ≤ T."""
+    return blocks([[(h + h.transpose()) * -1, h.transpose() * time], [h * time, w * time]])
 
-    def __init__(self, line):
-        self.line, self.points, self.pieces, controller = line, line["points"], line["pieces"], line["controller"]
-        self.a, self.b, trim, self.parameter = plant_of(line["plant"])
-        (self.n, self.m), turns = self.b.shape, self.parameter is not None
-        require(controller["operating_input"] == trim, "the operating input is not that of the plant")
-        require(controller["scheduling_state"] == self.parameter, "the scheduling state is not that of the plant")
-        self.q, self.r = check_weights(line["weights"], self.n, self.m)
-        self.sigma = [self.room(controller["limits"], i) for i in range(self.m)]
-        require(all(sigma is None or sigma >= 0 for sigma in self.sigma), "an input rests beyond its limits")
-        # ρ = -π + ω t, t from 0 to the number of pieces, once around the circle
-        require(0 < self.pieces <= 4096 if turns else self.pieces == len(self.points) == 1, "pieces are wrong")
-        self.low, self.omega = (arb(-math.pi), 2 * arb.pi() / self.pieces) if turns else (arb(0), arb(0))
-        self.check_schedule(controller["schedule"])
-        moving, joined = line.get("rate_bounded"), line.get("joined")
-        self.inverse = moving is not None
-        point = lambda key: {"basis": [{"function": "constant"}], "coefficients": [self.points[0][key]]}
-        given = (moving["y"], moving["l"]) if moving else (joined["p"], joined["auxiliary"]) if joined else (
-            point("p"), point("auxiliary_gain"))
-        for rows in given[0]["coefficients"]:
-            symmetric(rows, self.n, "a matrix of the Lyapunov function")
-        has_auxiliary = {p["auxiliary_gain"] is not None for p in self.points}
-        require(len(has_auxiliary) == 1, "some auxiliary gains are missing")
-        self.lyapunov = function(given[0], (self.n, self.n))
-        self.low_gain = function(given[1], (self.m, self.n)) if True in has_auxiliary else None
-        # inputs that lie between rows of F and K on the set, and those that could reach a limit
-        self.saturating = [i for i in range(self.m) if self.low_gain and self.sigma[i] is not None]
+
+class Loop:
+    """ẋ = Ax + Bu, u = -Kx within limits, and V = xᵀPx or, if `inverse`, V = xᵀY⁻¹x: of designs and polytopes.
+
+    The method of a theorem yields what has to be definite on a piece of the parameter's range, for `Family`.
+    """
+
+    parameter, pieces, vertices, low, omega = None, 1, 0, arb(0), arb(0)
+
+    def start(self, line, a, b):
+        self.line, self.a, self.b, (self.n, self.m) = line, a, b, b.shape
+        self.gains = functools.cache(self.gains)
+        if line["weights"]:
+            q, r = line["weights"]["q"], line["weights"]["r"]
+            symmetric(q, self.n, "Q"), symmetric(r, self.m, "R")
+            require(semidefinite(q, False) and semidefinite(r, True), "Q is not ⪰ 0, or R not ≻ 0")
+            self.q, self.r = Sum.constant(q), Sum.constant(r)
+
+    def limit(self, sigma, has_auxiliary):
+        """Inputs that lie between rows of F and K on the set, and those that could reach a limit."""
+        self.sigma, limited = sigma, [i for i in range(self.m) if sigma[i] is not None]
+        self.saturating = limited if has_auxiliary else []
         low = [self.gains(piece)[1] for piece in range(self.pieces)]
-        self.limited = [i for i in range(self.m) if self.sigma[i] is not None and any(k.rows([i]).terms for k in low)]
-        require(all(self.sigma[i] > 0 for i in self.limited), "an input that moves has no room")
-        self.check_points()
+        self.limited = [i for i in limited if not all(k.rows([i]).is_zero() for k in low)]
+        require(all(sigma[i] > 0 for i in self.limited), "an input that moves has no room")
 
-    def room(self, limits, i):
-        """σᵢ: |uᵢ - u*ᵢ| ≤ σᵢ is within the limits; None where there are none."""
-        trim, least, most = self.line["controller"]["operating_input"][i], limits["min"][i], limits["max"][i]
-        sides = [Fraction(trim) - Fraction(least)] if least is not None else []
-        return min(sides + ([Fraction(most) - Fraction(trim)] if most is not None else []), default=None)
+    def variants(self, kind):
+        """Of a claim: inputs that could reach a limit, or lists of inputs that fly K while others fly F."""
+        if kind == "unsaturated":
+            return self.limited
+        if kind not in ("decrease", "cost", "sampled-cost") or not self.saturating:
+            return [None]
+        chosen = itertools.product((False, True), repeat=len(self.saturating))
+        return [list(itertools.compress(self.saturating, bits)) for bits in chosen]
 
-    def check_schedule(self, schedule):
-        """Knots are where they should be, and gains at knots those of the points."""
-        self.gain, gains, rhos = schedule, [p["gain"] for p in self.points], [p["rho"] for p in self.points]
-        require(self.parameter is not None or rhos == [0.0], "there is no parameter")
-        for k, rho in enumerate(rhos):
-            off = arb(rho) - self.low - 2 * arb.pi() * k / len(rhos)
-            require(off.abs_upper() < 1e-12, "a grid point is not where it should be")
-        if schedule["kind"] == "grid":
-            require(self.parameter is not None and len(gains) == self.pieces > 3, "the knots are wrong")
-            require(abs(schedule["period"] - 2 * math.pi) < 1e-12, "the gains are not periodic")
-            require(schedule["parameters"] == rhos, "knots differ from grid points")
-            require(schedule["gains"] == gains, "scheduled gains differ from those of the grid points")
-        elif schedule["kind"] == "constant":
-            require([schedule["gain"]] == gains, "the gain differs from that of the point")
-        else:
-            require(schedule["kind"] == "vertices" and self.parameter is not None, "the schedule is not known")
-            corners = itertools.product((-1.0, 1.0), repeat=len(schedule["weights"]["features"]))
-            require(sorted(map(tuple, schedule["weights"]["corners"])) == list(corners), "they are no box's corners")
-            for rho, gain in zip(rhos, gains):
-                off, size = self.schedule(0).at(arb(rho)) - arb_mat(gain), max(abs(x) for row in gain for x in row)
-                require(all(x.abs_upper() < 1e-3 * size for x in off.entries()), "the gain is far from the points'")
-
-    def check_points(self):
-        """P (and F) of the points is that of the function up to rounding: PY = I, or P and F have its harmonics."""
-        for point in self.points:
-            symmetric(point["p"], self.n, "P of a point")
-            if self.inverse:
-                off = self.lyapunov.at(arb(point["rho"])) * arb_mat(point["p"]) - unit(self.n).at(arb(0))
-                require(all(x.abs_upper() < 1e-6 for x in off.entries()), "P of a point is not the inverse of Y")
-        pairs = [(self.lyapunov, "p"), (self.low_gain, "auxiliary_gain")]
-        for total, key in pairs if self.parameter is not None and not self.inverse else []:
-            given, count = [arb_mat(p[key]) for p in self.points if total], len(self.points)
-            for k, s in itertools.product(range((count - 1) // 2 + 1), (0, 1)) if total else []:
-                waves = [(arb(p["rho"]) * k).sin_cos()[1 - s] for p in self.points]
-                zero, weight = arb_mat(*total.shape), arb(2 if k else 1) / count
-                off = sum((p * w for p, w in zip(given, waves)), zero) * weight - total.terms.get((0, k, s), zero)
-                size = max(abs(x) for x in given[0].entries())
-                require(all(x.abs_upper() < 1e-10 * size for x in off.entries()), "a harmonic is not the points'")
-
-    def schedule(self, piece):
-        """K on a piece: the cubic in t through the knots before, at both ends and after it; or Σ wᵢ(ρ)Kᵢ."""
-        shape, schedule, total = (self.m, self.n), self.gain, Sum((self.m, self.n), {})
-        if schedule["kind"] == "constant":
-            return Sum.constant(schedule["gain"])
-        if schedule["kind"] == "vertices":
-            for corner, gain in zip(schedule["weights"]["corners"], schedule["gains"], strict=True):
-                weight = unit(1)  # Π (1 + c feature)/2
-                for c, feature in zip(corner, schedule["weights"]["features"], strict=True):
-                    wave = (0, 1, {"cos": 0, "sin": 1}[feature])
-                    weight @= Sum((1, 1), {(0, 0, 0): arb_mat([[0.5]]), wave: arb_mat([[c / 2]])})
-                total += Sum(shape, {key: arb_mat(gain) * w[0, 0] for key, w in weight.terms.items()})
-            return total
-        for node in (-1, 0, 1, 2):
-            weight = [Fraction(1)]  # Π (t - other)/(node - other), by powers of t
-            for other in {-1, 0, 1, 2} - {node}:
-                down, up = [x * -other for x in weight] + [0], [0] + weight
-                weight = [Fraction(x + y, node - other) for x, y in zip(down, up)]
-            gain = arb_mat(schedule["gains"][(piece + node) % self.pieces])
-            total += Sum(shape, {(j, 0, 0): gain * ball(w) for j, w in enumerate(weight)})
-        return total
-
-    def place(self, piece):
-        return self.low + self.omega * piece, self.omega
+    def mixed(self, inputs, high, low):
+        """Rows of `high` for these inputs, of `low` for others."""
+        picked = [i in inputs for i in range(self.m)]
+        return Sum.constant(diagonal(picked)) @ high + Sum.constant(diagonal([not x for x in picked])) @ low
 
     def gains(self, piece):
-        """K, and the rows that are not to saturate; both times Y in the inverse form."""
-        k = self.schedule(piece) @ (self.lyapunov if self.inverse else unit(self.n))
-        return k, blocks([[(self.low_gain if i in self.saturating else k).rows([i])] for i in range(self.m)])
+        """K, and the rows that are not to saturate; both times Y if `inverse`."""
+        k = self.scheduled(piece)
+        return k, self.mixed(self.saturating, self.auxiliary, k) if self.saturating else k
 
-    def definite(self, piece, floor=0.0):
-        """P ≻ 0; or Y ⪰ floor I, which is P ⪯ I/floor."""
-        if floor == 0.0 or self.inverse:
-            return Family(self.place(piece), [self.lyapunov - unit(self.n, floor)])
-        return Family(self.place(piece), [unit(self.n) - self.lyapunov.times(floor)])
+    def shows(self, theorem, claim, group):
+        """Whether the matrices of a theorem are definite on the cells of a group."""
+        piece = group["piece"]
+        cells = [[a - piece, b - piece, more[0] if more else None] for a, b, *more in group["cells"]]
+        if not any(extra for *_, extra in cells):  # then cells are no more than a hint how wide they may be
+            several = [cells[k : k + JOINED] for k in range(0, len(cells), JOINED)]
+            cells = [[some[0][0], some[-1][1], None] for some in several]
+        for parts, finish in theorem(self, claim, piece, group["variant"]):
+            degree = max(len(v) for part in parts for *_, v in part.terms)
+            each = zip(*(part.by_vertices(self.vertices, degree) for part in parts)) if self.vertices else [parts]
+            families = (Family((self.low + self.omega * piece, self.omega), part, finish) for part in each)
+            if not all(family.is_definite_on(cells) for family in families):
+                return False
+        return True
 
-    def unsaturated(self, piece, i, level):
-        """[σ²/γ, f; fᵀ, P] ≻ 0, or the same with fY and Y: (fx)² < σ² where V ≤ γ."""
-        row, corner = self.gains(piece)[1].rows([i]), arb_mat([[ball(self.sigma[i] ** 2) / arb(level)]])
-        return Family(self.place(piece), [blocks([[Sum((1, 1), {(0, 0, 0): corner}), row], [row.t, self.lyapunov]])])
+    def definite(self, claim, piece, variant):
+        yield [self.lyapunov], alone
 
-    def falling(self, piece, flying, rate, ratio):
+    def bounded(self, claim, piece, variant):
+        """Y ⪰ floor I, which is P ⪯ I/floor."""
+        one, floor = Sum.constant(unit(self.n)), claim["floor"]
+        yield [self.lyapunov - one.times(floor) if self.inverse else one - self.lyapunov.times(floor)], alone
+
+    def unsaturated(self, claim, piece, i):
+        """P - γfᵀf/σ² ≻ 0, or the same with Y and fY: (fx)² < σ² where V ≤ γ."""
+        sigma = arb(self.sigma[i].numerator) / self.sigma[i].denominator
+        finish = lambda parts, _: parts[0] - parts[1].transpose() * parts[1] * (arb(claim["level"]) / sigma**2)
+        yield [self.lyapunov, self.gains(piece)[1].rows([i])], finish
+
+    def falling(self, claim, piece, flying):
         """-V̇ - ratio (xᵀQx + uᵀRu) > 0, input rows of K where they are `flying`, the others of F.
 
         V = xᵀPx:     -(P(A - BS) + ·ᵀ + ρ̇ P′) - ratio (Q + SᵀRS)
         V = xᵀY⁻¹x:   -(AY - BG + ·ᵀ) + ρ̇ Y′ - ratio (YQY + GᵀRG),  G = SY, between Y⁻¹
 
         With flying = "rows" an input is f x + θ(k - f)x, 0 ≤ θ ≤ 1, and θ² ≤ θ: the form is at least that of S = F less
-        Σ θ (dᵢx)(gᵢx), d = k - f, g = ratio rᵢ(k + f) - 2bᵢᵀP (`bordered`).
+        Σ θ (dᵢx)(gᵢx), d = k - f, g = ratio rᵢ(k + f) - 2bᵢᵀP (`less_squares`).
         """
-        w, q, r, (k, low) = self.lyapunov, Sum.constant(self.q), Sum.constant(self.r), self.gains(piece)
-        of_k = lambda i: i not in self.saturating or (flying != "rows" and i in flying)
-        s = blocks([[(k if of_k(i) else low).rows([i])] for i in range(self.m)])
+        w, (k, low), by_rows = self.lyapunov, self.gains(piece), flying == "rows"
+        s = self.mixed(flying, k, low) if flying and not by_rows else low
+        flow = self.b @ s - self.a @ w if self.inverse else w @ (self.b @ s - self.a)
+        flow, push = flow + flow.t, (self.b if self.inverse else w @ self.b).t.times(-2)
+        if claim["kind"] == "cost":
+            ratio = 1 / arb(claim["factor"])
+            flow -= ((w @ self.q @ w if self.inverse else self.q) + s.t @ self.r @ s).times(ratio)
+            push += (self.r @ (k + low)).times(ratio)
+        r = self.line["weights"]["r"] if by_rows else []
+        require(not any(x for i, row in enumerate(r) for j, x in enumerate(row) if i != j), "R is not diagonal")
+        for motion in self.motions(claim):
+            base = flow + motion if self.inverse else flow - motion
+            rows = [push.rows(self.saturating), (k - low).rows(self.saturating)] if by_rows else []
+            yield [base, *rows], less_squares if by_rows else alone
+
+
+class Design(Loop):
+    """A plant and the design for it."""
+
+    def __init__(self, line):
+        controller, self.points, self.pieces = line["controller"], line["points"], line["pieces"]
+        a, b, self.trim, self.parameter = plant_of(line["plant"])
+        self.start(line, a, b)
+        require(controller["operating_input"] == self.trim, "the operating input is not that of the plant")
+        require(controller["scheduling_state"] == self.parameter, "the scheduling state is not that of the plant")
+        constant = lambda key: {"basis": [{"function": "constant"}], "coefficients": [self.points[0][key]]}
+        lyapunov, auxiliary = constant("p"), constant("auxiliary_gain")
+        if self.parameter is None:
+            require(self.pieces == len(self.points) == 1, "pieces are wrong")
+        else:  # ρ = -π + ω t, t from 0 to the number of pieces, once around the circle
+            require(0 < self.pieces <= 4096, "pieces are wrong")
+            self.low, self.omega = arb(-math.pi), 2 * arb.pi() / self.pieces
+        self.inverse = line.get("rate_bounded") is not None
         if self.inverse:
-            flow, stage, motion = self.b @ s - self.a @ w, w @ q @ w + s.t @ r @ s, w.by_rho()
+            lyapunov, auxiliary = line["rate_bounded"]["y"], line["rate_bounded"]["l"]
+        elif self.parameter is not None:
+            lyapunov, auxiliary = line["joined"]["p"], line["joined"]["auxiliary"]
+        for rows in [*lyapunov["coefficients"], *(point["p"] for point in self.points)]:
+            symmetric(rows, self.n, "a matrix of the Lyapunov function")
+        has_auxiliary = {point["auxiliary_gain"] is not None for point in self.points}
+        require(len(has_auxiliary) == 1, "some auxiliary gains are missing")
+        self.lyapunov = function(lyapunov, (self.n, self.n))
+        self.auxiliary = function(auxiliary, (self.m, self.n)) if True in has_auxiliary else None
+        self.check_schedule(controller["schedule"])
+        self.check_points()
+        sigma = [self.room(controller["limits"], i) for i in range(self.m)]
+        require(all(s is None or s >= 0 for s in sigma), "an input rests beyond its limits")
+        self.limit(sigma, True in has_auxiliary)
+
+    def room(self, limits, i):
+        """σᵢ: |uᵢ - u*ᵢ| ≤ σᵢ is within the limits; None where there are none."""
+        sides = [(limits["max"][i], 1), (limits["min"][i], -1)]
+        return min((s * (Fraction(end) - Fraction(self.trim[i])) for end, s in sides if end is not None), default=None)
+
+    def check_schedule(self, schedule):
+        """Knots are where they should be, and gains at knots those of the points."""
+        turns, gains, rhos = self.parameter is not None, *([p[key] for p in self.points] for key in ("gain", "rho"))
+        require(turns or rhos == [0.0], "there is no parameter")
+        for k, rho in enumerate(rhos):
+            off = arb(rho) - self.low - 2 * arb.pi() * k / len(rhos)
+            require(off.abs_upper() < 1e-12, "a grid point is not where it should be")
+        if schedule["kind"] == "grid":
+            require(turns and len(gains) == self.pieces > 3, "the knots are wrong")
+            require(abs(schedule["period"] - 2 * math.pi) < 1e-12, "the gains are not periodic")
+            require(schedule["parameters"] == rhos, "knots differ from grid points")
+            require(schedule["gains"] == gains, "scheduled gains differ from those of the grid points")
+        elif schedule["kind"] == "constant":
+            require([schedule["gain"]] == gains, "the gain differs from that of the point")
         else:
-            flow, stage, motion = w @ (self.b @ s - self.a), q + s.t @ r @ s, w.by_rho().times(-1)
-        base = flow + flow.t + motion.times(rate) - stage.times(ratio)
-        if flying != "rows":
-            return Family(self.place(piece), [base])
-        require(all(self.r[i][j] == 0 for i in range(self.m) for j in range(i)), "R is not diagonal")
-        push = (r @ (k + low)).times(ratio) - (self.b if self.inverse else w @ self.b).t.times(2)
-        return Family(self.place(piece), *bordered(base, push.rows(self.saturating), (k - low).rows(self.saturating)))
+            require(schedule["kind"] == "vertices" and turns, "the schedule is not known")
+            corners = itertools.product((-1.0, 1.0), repeat=len(schedule["weights"]["features"]))
+            require(sorted(map(tuple, schedule["weights"]["corners"])) == list(corners), "they are no box's corners")
+            for rho, gain in zip(rhos, gains):
+                size = max(abs(x) for row in gain for x in row)
+                close(self.schedule(0).at(arb(rho)) - arb_mat(gain), size, 1e-3, "the gain is far from the points'")
+
+    def check_points(self):
+        """P (and F) of the points is that of the function up to rounding: PY = I, or P and F have its harmonics."""
+        if self.inverse:
+            for point in self.points:
+                off = self.lyapunov.at(arb(point["rho"])) * arb_mat(point["p"]) - unit(self.n)
+                close(off, 1, 1e-6, "P of a point is not the inverse of Y")
+        elif self.parameter is not None:
+            pairs, count = [(self.lyapunov, "p"), (self.auxiliary, "auxiliary_gain")], len(self.points)
+            for (total, key), k, s in itertools.product(pairs, range((count + 1) // 2), (0, 1)):
+                if total is not None:
+                    require(all(2 * order < count for _, order, *_ in total.terms), "a harmonic is of no point")
+                    waves = [(arb(p["rho"]) * k).sin_cos()[1 - s] * (2 if k else 1) / count for p in self.points]
+                    given, zero = [arb_mat(p[key]) for p in self.points], arb_mat(*total.shape)
+                    off = sum((p * w for p, w in zip(given, waves)), zero) - total.terms.get((0, k, s, ()), zero)
+                    close(off, max(map(abs, given[0].entries())), 1e-10, "a harmonic is not the points'")
+
+    def schedule(self, piece):
+        """K on a piece: the cubic in t through the knots before, at both ends and after it; or Σ wᵢ(ρ)Kᵢ."""
+        shape, schedule, pairs = (self.m, self.n), self.line["controller"]["schedule"], []
+        if schedule["kind"] == "constant":
+            return Sum.constant(schedule["gain"])
+        if schedule["kind"] == "vertices":
+            for corner, gain in zip(schedule["weights"]["corners"], schedule["gains"], strict=True):
+                weight = Sum.constant([[1]])  # Π (1 + c feature)/2
+                for c, feature in zip(corner, schedule["weights"]["features"], strict=True):
+                    wave = ((0, 1, {"cos": 0, "sin": 1}[feature], ()), arb_mat([[c / 2]]))
+                    weight @= Sum.constant([[0.5]]) + Sum((1, 1), [wave])
+                pairs += [(key, arb_mat(gain) * w[0, 0]) for key, w in weight.terms.items()]
+            return Sum(shape, pairs)
+        for knot, weights in CUBIC.items():
+            gain = arb_mat(schedule["gains"][(piece + knot) % self.pieces])
+            pairs += [((j, 0, 0, ()), gain * (arb(weight) / 6)) for j, weight in enumerate(weights)]
+        return Sum(shape, pairs)
+
+    def scheduled(self, piece):
+        return self.schedule(piece) @ self.lyapunov if self.inverse else self.schedule(piece)
+
+    def motions(self, claim):
+        """ρ̇ P′ at the largest rates."""
+        return [self.lyapunov.slope(0, rate) for rate in {-claim["rate"], claim["rate"]}]
 
     def held(self, time):
         """(AT)^k/(k + 1)!, k = 0, 1, …, with the rest of the series as the last: x(T) = x + TΦ(Ax + Bu) while u is held
         for T, where Φ is their sum."""
-        terms, n = [unit(self.n)], self.n
+        terms = [Sum.constant(unit(self.n))]
         while terms[-1].terms and len(terms) <= SERIES:
             terms.append((terms[-1] @ self.a).times(arb(time) / (len(terms) + 1)))
-        if terms[-1].terms:  # the rest is at most Σ_{k > N} a^k/(k + 1)! ≤ 2 a^{N+1}/(N + 2)! for the norm a ≤ N/2 of AT
-            at = self.a.times(time).terms
-            require(set(at) == {(0, 0, 0)}, "the series of a plant with a parameter does not end")
-            norm = reduce(arb.max, (sum((x.abs_upper() for x in row), arb(0)) for row in at[0, 0, 0].tolist()))
+        if terms[-1].terms:  # Σ_{k > N} a^k/(k + 1)! ≤ 2 a^{N+1}/(N + 2)! for the norm a ≤ N/2 of AT
+            require(self.parameter is None, "the series of a plant with a parameter does not end")
+            rows = self.a.times(time).at(arb(0)).tolist()
+            norm = functools.reduce(arb.max, (sum(map(arb.abs_upper, row)) for row in rows))
             require(norm < SERIES / 2, "the sample time is too long")
             rest = arb(0, (2 * norm ** (SERIES + 1) / arb.fac_ui(SERIES + 2)).abs_upper())
-            terms.append(Sum((n, n), {(0, 0, 0): arb_mat([[rest] * n] * n)}))
+            terms.append(Sum.constant([[rest] * self.n] * self.n))
         return terms
 
-    def kept(self, piece, time, between):
-        """V is smaller at the next sample than at x, of every v between Fx and Kx that is held; one family for each φ.
+    def kept(self, claim, piece, variant):
+        """V is smaller at the next sample than at x, of every v between Fx and Kx that is held; of each φ a matrix.
 
-        x(τ) = x + τE x, E = φ(A - BS), v = Sx. V(x(τ)) < V(x) is EᵀP + PE + τEᵀPE ≺ 0; by Schur, with H = PE (or EY),
-        [-(H + Hᵀ), THᵀ; TH, TP] ≻ 0 is enough for τ ≤ T. It is affine in E and so in S: row i adds θ(uwᵀ + wuᵀ),
-        u = (d, 0), w = (η, -Tη), η = Pφbᵢ, which is -θ(u·)(g·), g = -2w, as in `bordered`. At the sample φ = Φ. For all
-        τ = sT, N = AT: φ = I + sN/2 + s²N²/6 + s³(…), by Bernstein's polynomials a convex combination of I, I + N/4 and
-        I + N/2 + N²/6, and what follows, N^k s^k/(k + 1)!, is in [0, 1] N^k/(k + 1)!.
+        x(τ) = x + τEx, E = φ(A - BS), v = Sx. `after_a_sample` is affine in E and so in S: row i adds θ(uwᵀ + wuᵀ),
+        u = (d, 0), w = (η, -Tη), η = Pφbᵢ, which is -θ(u·)(g·), g = -2w, as in `less_squares`. At the sample φ = Φ. For
+        all τ = sT, N = AT: φ = I + sN/2 + s²N²/6 + s³(…), by Bernstein's polynomials a convex combination of I, I + N/4
+        and I + N/2 + N²/6, and what follows, N^k s^k/(k + 1)!, is in [0, 1] N^k/(k + 1)!.
         """
-        w, (k, low), terms = self.lyapunov, self.gains(piece), self.held(time)
-        flow = (self.a @ w if self.inverse else self.a) - self.b @ low
-        shares = [(0, 0), (0.5, 0), (1, 1)] if between else [(1, 1)]
-        for share in shares:
+        w, (k, low), time, between = self.lyapunov, self.gains(piece), arb(claim["sample_time_s"]), claim["between"]
+        flow, terms = (self.a @ w if self.inverse else self.a) - self.b @ low, self.held(time)
+
+        def falls(parts, weights):
+            h, w, *rows = parts
+            base = after_a_sample(h, w, time)
+            if not rows:
+                return base
+            push, difference = ([[rows[0] * -2, rows[0] * (2 * time)]], [[rows[1], rows[1] * 0]])
+            return less_squares([base, blocks(push), blocks(difference)], weights)
+        for share in [(0, 0), (0.5, 0), (1, 1)] if between else [(1, 1)]:
             weights = [1, *share] + [arb(0.5, 0.5) if between else 1] * len(terms)
-            phi = reduce(add, (term.times(weight) for term, weight in zip(terms, weights)))
+            phi = sum((term.times(weight) for term, weight in zip(terms, weights)), Sum((self.n, self.n)))
             h, eta = (phi @ x if self.inverse else w @ phi @ x for x in (flow, self.b))
-            base = blocks([[(h + h.t).times(-1), h.t.times(time)], [h.times(time), w.times(time)]])
-            if not self.saturating:
-                yield Family(self.place(piece), [base])
-                continue
-            push = blocks([[eta.t.times(-2), eta.t.times(2 * time)]]).rows(self.saturating)
-            difference = blocks([[k - low, Sum((self.m, self.n), {})]]).rows(self.saturating)
-            yield Family(self.place(piece), *bordered(base, push, difference))
+            yield [h, w, *(x.rows(self.saturating) for x in (eta.t, k - low) if self.saturating)], falls
 
-    def sampled(self, piece, time):
-        """With X of the cell: [-(EᵀX + XE), TEᵀX; TXE, TX] ≻ 0, so that X - (I + TE)ᵀX(I + TE) ≻ 0 and X ≻ 0.
+    def sampled(self, claim, piece, variant):
+        """xᵀXx, X of the cell, is smaller at the next sample: x₊ = (I + TE)x, E = Φ(A - BK), if u is held for T."""
+        time, phi = arb(claim["sample_time_s"]), sum(self.held(claim["sample_time_s"]), Sum((self.n, self.n)))
+        falls = lambda parts, x: after_a_sample(arb_mat(x) * parts[0], arb_mat(x), time)
+        yield [phi @ (self.a - self.b @ self.schedule(piece))], falls
 
-        x₊ = (I + TE)x is the loop whose input is held for T: E = Φ(A - BK).
+    def sampled_cost(self, claim, piece, flying):
+        """factor (P - MᵀPM) - ZᵀWZ of one mixture, v = Sx held for T: over a period V falls by the cost, or more.
+
+        z(τ) = e^{Gτ}Zx for z = (x, v), G = [A, -B; 0, 0], Z = [I; S]; M is the upper part of e^{GT}Z, and the cost is
+        zᵀWz, W = ∫₀ᵀ e^{Gᵀτ}Ce^{Gτ} dτ, C = [Q, 0; 0, R]. Van Loan: e^{XT} = [·, N; 0, e^{GT}] for X = [-Gᵀ, C; 0, G],
+        and W = (e^{GT})ᵀN. The difference is concave in v, and so least at a mixture.
         """
-        n = self.n
+        require(self.parameter is None and not self.inverse, "it is of a plant without a parameter, and of P")
+        n, m, s = self.n, self.m, self.mixed(flying or [], *self.gains(piece))
+        a, b, q, r, p, s = (x.at(arb(0)) for x in (self.a, self.b, self.q, self.r, self.lyapunov, s))
+        with ctx.workprec(256):
+            g = blocks([[a, b * -1], [arb_mat(m, n + m)]])
+            c = blocks([[q, arb_mat(n, m)], [arb_mat(m, n), r]])
+            x = blocks([[g.transpose() * -1, c], [arb_mat(n + m, n + m), g]])
+            right = [row[n + m :] for row in (x * arb(claim["sample_time_s"])).exp().tolist()]
+            z = blocks([[unit(n)], [s]])
+            beside, end = arb_mat(right[: n + m]) * z, arb_mat(right[n + m :]) * z
+            moved = arb_mat(end.tolist()[:n])
+            left = (p - moved.transpose() * p * moved) * arb(claim["factor"]) - end.transpose() * beside
+        yield [Sum.constant(left)], alone
 
-        def assemble(entries, x, constant):
-            xe = x * arb_mat(n, n, entries)
-            flow, side, corner = ((xe + xe.transpose()) * arb(-1), xe * arb(time), x * arb(time * constant))
-            top = zip(flow.tolist(), side.transpose().tolist())
-            return sum((left + right for left, right in itertools.chain(top, zip(side.tolist(), corner.tolist()))), [])
-        return Family(self.place(piece), [reduce(add, self.held(time)) @ (self.a - self.b @ self.schedule(piece))], assemble)
 
-
-class Polytope:
+class Polytope(Loop):
     """A(ρ) = Σ ρᵢAᵢ, B(ρ) = Σ ρᵢBᵢ; V = xᵀPx, u = -Σ ρᵢKᵢx, or V = xᵀ(Σ ρᵢYᵢ)⁻¹x, u = -(Σ ρᵢLᵢ)(Σ ρᵢYᵢ)⁻¹x."""
 
-    parameter = None
-
     def __init__(self, line):
-        self.line, self.common, self.count = line, "P" in line, len(line["A"])
-        self.n, self.m = len(line["B"][0]), len(line["B"][0][0])
-        given = [line["P"]] * self.count if self.common else line["Y"]
-        for rows in given:
-            symmetric(rows, self.n, "P or Y")
+        self.inverse, self.vertices = "P" not in line, len(line["A"])
+        n, m, f, sigma = len(line["B"][0]), len(line["B"][0][0]), line["F"], line["sigma"]
+
         def all_of(matrices, rows, columns):
-            each = [arb_mat(matrix) for matrix in matrices]
-            require(len(each) == self.count, "a vertex is missing")
-            require(all((x.nrows(), x.ncols()) == (rows, columns) for x in each), "a matrix is of another size")
-            return each
-        self.a, self.b = all_of(line["A"], self.n, self.n), all_of(line["B"], self.n, self.m)
-        self.lyapunov = all_of(given, self.n, self.n)
-        self.gain = all_of(line["K" if self.common else "L"], self.m, self.n)
-        self.rates = [[0.0] * self.count] if self.common else line["rate_vertices"]
+            require(len(matrices) == self.vertices, "a vertex is missing")
+            return Sum((rows, columns), [((0, 0, 0, (i,)), arb_mat(matrix)) for i, matrix in enumerate(matrices)])
+        self.start(line, all_of(line["A"], n, n), all_of(line["B"], n, m))
+        self.y, self.rates = (line["Y"], line["rate_vertices"]) if self.inverse else ([], [[0.0] * self.vertices])
+        for rows in self.y or [line["P"]]:
+            symmetric(rows, n, "P or Y")
+        self.lyapunov = all_of(self.y, n, n) if self.inverse else Sum.constant(line["P"])
         for rates in self.rates:
-            off = sum(map(Fraction, rates))
-            require(len(rates) == self.count and abs(off) <= 1e-9 * max(map(abs, rates)), "rates do not sum to zero")
+            off = abs(sum(map(Fraction, rates)))
+            require(len(rates) == self.vertices and off <= 1e-9 * max(map(abs, rates)), "rates do not sum to zero")
         require(self.rates, "rate vertices are missing")
-        if line["weights"]:
-            self.q, self.r = map(arb_mat, check_weights(line["weights"], self.n, self.m))
-        self.sigma = line["sigma"] or [None] * self.m
-        require(len(self.sigma) == self.m and all(s is None or s > 0 for s in self.sigma), "sigma is wrong")
-        self.saturating = [i for i in range(self.m) if line["F"] and self.sigma[i] is not None]
-        f = all_of(line["F"], self.m, self.n) if line["F"] else self.gain
-        self.low = f if self.common or not line["F"] else [x * y for x, y in zip(f, self.lyapunov)]
-        self.low = self.mixed(set(range(self.m)) - set(self.saturating))
-        moves = lambda i: any(not x.is_zero() for k in self.low for x in k.tolist()[i])
-        self.limited = [i for i in range(self.m) if self.sigma[i] is not None and moves(i)]
+        require(sigma is None or len(sigma) == m and all(s is None or s > 0 for s in sigma), "sigma is wrong")
+        self.gain = all_of(line["L" if self.inverse else "K"], m, n)
+        low = [arb_mat(x) * arb_mat(y) for x, y in zip(f, self.y)] if f and self.inverse else f
+        self.auxiliary = all_of(low, m, n) if f else None
+        self.limit([None if s is None else Fraction(s) for s in sigma or [None] * m], f)
 
-    def mixed(self, flying):
-        """S at the vertices: rows of K or L where they are `flying`."""
-        pick = lambda k, f: arb_mat([(k if i in flying else f).tolist()[i] for i in range(self.m)])
-        return [pick(k, f) for k, f in zip(self.gain, self.low)]
+    def scheduled(self, piece):
+        return self.gain
 
-    def matrices(self, claim):
-        """All that have to be definite: Σ ρᵢρⱼ Mᵢⱼ ≻ 0 if every Mᵢᵢ ≻ 0 and Mᵢⱼ + Mⱼᵢ ≻ 0."""
-        if claim["kind"] == "definite":
-            yield from self.lyapunov
-        elif claim["kind"] == "unsaturated":
-            for i, (low, w) in itertools.product(self.limited, zip(self.low, self.lyapunov)):
-                row, corner = low.tolist()[i], ball(Fraction(self.sigma[i]) ** 2) / arb(claim["level"])
-                yield arb_mat([[corner] + row] + [[x] + y for x, y in zip(row, w.tolist())])
-        else:
-            others = set(range(self.m)) - set(self.saturating)
-            pairs = list(itertools.combinations_with_replacement(range(self.count), 2))
-            for chosen in itertools.product((False, True), repeat=len(self.saturating)):
-                s = self.mixed(others | set(itertools.compress(self.saturating, chosen)))
-                for rates, (i, j) in itertools.product(self.rates, pairs):
-                    yield reduce(add, [self.pair(k, l, s, rates, claim) for k, l in {(i, j), (j, i)}])
-
-    def pair(self, i, j, s, rates, claim):
-        """Mᵢⱼ of -V̇ - (xᵀQx + uᵀRu)/factor, as `Design.falling`."""
-        w = self.lyapunov
-        flow = w[0] * (self.b[i] * s[j] - self.a[i]) if self.common else self.b[i] * s[j] - self.a[i] * w[j]
-        m = reduce(add, (y * arb(rate) for rate, y in zip(rates, w)), flow + flow.transpose())
-        if claim["kind"] == "cost":
-            stage = s[i].transpose() * self.r * s[j] + (self.q if self.common else w[i] * self.q * w[j])
-            m -= (stage + stage.transpose()) / (2 * arb(claim["factor"]))
-        return m
+    def motions(self, claim):
+        pairs = lambda rates: [((0, 0, 0, ()), arb_mat(y) * arb(rate)) for y, rate in zip(self.y, rates)]
+        return [Sum((self.n, self.n), pairs(rates)) for rates in self.rates]

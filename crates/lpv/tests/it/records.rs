@@ -88,12 +88,16 @@ fn what_is_not_proved_is_not_recorded() {
     };
     let design = design(&spec, &*plant, &request, &|_| {}).unwrap();
     let all = record(&design, &*plant, &ProofOptions::default());
-    assert_eq!(kinds(&all), ["definite", "unsaturated", "decrease", "cost", "kept", "sampled"]);
+    assert_eq!(kinds(&all), ["definite", "unsaturated", "decrease", "cost", "kept", "sampled", "sampled-cost"]);
     assert_eq!(all[5]["premises"], serde_json::json!([0, 1, 2]));
     // V that falls under every mixture falls under K
     let [kept, sampled] = [&all[6], &all[7]];
     assert_eq!((&kept["premises"], &kept["between"]), (&serde_json::json!([0, 1]), &true.into()));
     assert_eq!((&sampled["premises"], &sampled["groups"]), (&serde_json::json!([4]), &serde_json::json!([])));
+    // of a low gain there is one mixture
+    let group = serde_json::json!([{"piece": 0, "variant": null, "cells": [["0x0.0p+0", "0x1.0000000000000p+0"]]}]);
+    assert_eq!((&all[8]["premises"], &all[8]["groups"]), (&serde_json::json!([0, 1]), &group));
+    assert_eq!(number(&all[8]["level"]), number(&all[3]["level"]));
     // the gain saturates on a set that large, and so nothing is known that assumes it does not
     let some = record(&design, &*plant, &ProofOptions { level: Some(1000.0), ..Default::default() });
     let known: Vec<&str> = kinds(&some).into_iter().filter(|kind| !["unsaturated", "kept"].contains(kind)).collect();

@@ -66,6 +66,7 @@ const DECREASE: (&str, &[&str]) = ("decrease", &["decrease", "invariance"]);
 const COST: (&str, &[&str]) = ("cost", &["cost"]);
 const SAMPLED: (&str, &[&str]) = ("sampled", &["sampled-stability"]);
 const KEPT: (&str, &[&str]) = ("kept", &["sampled-invariance"]);
+const SAMPLED_COST: (&str, &[&str]) = ("sampled-cost", &["sampled-cost"]);
 
 /// The proved claim of this kind about the model.
 fn proved<'c>(claims: &'c [Claim], (_, names): (&str, &[&str])) -> Option<&'c Claim> {
@@ -162,6 +163,13 @@ impl Record {
                 value.insert("sample_time_s".into(), json!(time));
                 self.add("claim", value)?;
             }
+        }
+        if let (Some(found), true) = (proved(&proofs.claims, SAMPLED_COST), founded.len() == needed)
+            && let ClaimKind::SampledCost { factor, level, sample_time_s } = found.kind
+        {
+            let mut value = claim(SAMPLED_COST.0, &founded, mixtures(&closed_loop.saturating()));
+            value.extend(object(json!({"factor": factor, "level": level, "sample_time_s": sample_time_s})));
+            self.add("claim", value)?;
         }
         Ok(cost)
     }
@@ -375,18 +383,26 @@ fn falling(closed_loop: &ClosedLoop, rate: f64, factor: Option<f64>) -> Result<V
             Ok(groups(cells, |_| json!("rows"), multipliers))
         }
         Found::ByMixtures(cells) => {
-            let flying = |place: &Place| match saturating.is_empty() {
-                true => Value::Null,
-                false => json!(
-                    (0..saturating.len())
-                        .filter(|i| place.variant >> i & 1 == 1)
-                        .map(|i| saturating[i])
-                        .collect::<Vec<_>>()
-                ),
-            };
-            Ok(groups(cells.ok_or(RecordError::NotFound("V decreases"))?, flying, |_, _| ()))
+            let cells = cells.ok_or(RecordError::NotFound("V decreases"))?;
+            Ok(groups(cells, |place| flying(place.variant, &saturating), |_, _| ()))
         }
     }
+}
+
+/// The inputs of a mixture that fly K, of those that may saturate; null where none may.
+fn flying(mixture: usize, saturating: &[usize]) -> Value {
+    match saturating.is_empty() {
+        true => Value::Null,
+        false => {
+            json!((0..saturating.len()).filter(|i| mixture >> i & 1 == 1).map(|i| saturating[i]).collect::<Vec<_>>())
+        }
+    }
+}
+
+/// The one cell that there is without a parameter, of every mixture. Their matrices follow from the design, and are not recorded.
+fn mixtures(saturating: &[usize]) -> Vec<Value> {
+    let group = |mixture| json!({"piece": 0, "variant": flying(mixture, saturating), "cells": [[0.0, 1.0]]});
+    (0..1_usize << saturating.len()).map(group).collect()
 }
 
 /// Each with its X.
