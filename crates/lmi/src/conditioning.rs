@@ -40,13 +40,13 @@ impl Problem {
         };
         let mut relaxed = self.without_inequalities();
         let t = relaxed.scalar("margin");
-        for (Inequality { name, expression, margin }, block) in self.inequalities.iter().zip(&answer.blocks) {
+        for (Inequality { name, expression, margin, lazy }, block) in self.inequalities.iter().zip(&answer.blocks) {
             let n = block.size;
             let value = answer.value(expression);
             let mean = (0..n).map(|i| value[(i, i)]).sum::<f64>() / n.max(1) as f64;
             let expression = expression - t.times(&(mean * Mat::<f64>::identity(n, n)));
             let margin = Some(margin.unwrap_or(block.margin));
-            relaxed.inequalities.push(Inequality { name: name.clone(), expression, margin });
+            relaxed.inequalities.push(Inequality { name: name.clone(), expression, margin, lazy: *lazy });
         }
         let sign = if *sense == Sense::Minimize { 1.0 } else { -1.0 };
         let limit = sign * answer.objective + room * (1.0 + answer.objective.abs());

@@ -82,7 +82,7 @@ impl Problem {
     fn least_relaxation(&self, relaxed: &dyn Fn(usize) -> bool, options: &Options) -> Result<Answer, Error> {
         let mut problem = self.without_inequalities();
         let t = problem.scalar("relaxation");
-        for (block, Inequality { name, expression, margin }) in self.inequalities.iter().enumerate() {
+        for (block, Inequality { name, expression, margin, lazy }) in self.inequalities.iter().enumerate() {
             let n = expression.nrows();
             let expression = match relaxed(block) {
                 true => expression + t.times(&Mat::identity(n, n)),
@@ -92,6 +92,7 @@ impl Problem {
                 name: name.clone(),
                 expression,
                 margin: Some(margin.unwrap_or(0.0)),
+                lazy: *lazy,
             });
         }
         // Inequalities relaxed beyond need would leave t without end where there is no contradiction.

@@ -67,6 +67,7 @@ mod estimate;
 mod explanation;
 mod expression;
 mod factored;
+mod generation;
 pub mod guide;
 mod interior_point;
 mod lanczos;

@@ -20,6 +20,8 @@ pub(crate) struct Inequality {
     pub expression: Expr,
     /// `None`: the default margin of the options.
     pub margin: Option<f64>,
+    /// The family of one that is posed only where an answer without it breaks it.
+    pub lazy: Option<usize>,
 }
 
 /// The direction of the objective.
@@ -77,12 +79,12 @@ impl Problem {
 
     /// Demands `F ≻ 0`, posed as `F ⪰ margin·I` with the default margin of [`Options::margin`].
     pub fn positive_definite(&mut self, name: impl Into<String>, expression: impl Into<Expr>) {
-        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: None });
+        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: None, lazy: None });
     }
 
     /// Demands `F ⪰ margin·I`.
     pub fn positive_definite_by(&mut self, name: impl Into<String>, expression: impl Into<Expr>, margin: f64) {
-        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: Some(margin) });
+        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: Some(margin), lazy: None });
     }
 
     /// Sets the objective: the smallest value of a 1 × 1 expression.
@@ -113,6 +115,9 @@ impl Problem {
     /// square and symmetric, an objective that is not 1 × 1, an unknown of another problem, an option out of range.
     /// Infeasible, unbounded and inaccurate are outcomes.
     pub fn solve(&self, options: &Options) -> Result<Answer, Error> {
+        if self.has_lazy() {
+            return self.generate(options);
+        }
         self.solve_in_stages(None, options)
     }
 

@@ -59,6 +59,9 @@ impl Unknowns {
     }
 }
 
+/// Blocks that are posed all at once.
+const FEW_BLOCKS: usize = 48;
+
 /// The vertices and pairs of vertices of the double sum, with the rate vertices.
 pub(super) struct DoubleSum<'a> {
     polytope: &'a Polytope,
@@ -96,6 +99,19 @@ impl<'a> DoubleSum<'a> {
                 rate_vertices.iter().enumerate().map(|(k, nu)| (name(k), rate(nu))).collect()
             }
         }
+    }
+
+    /// Whether a block, counted over the rates and the terms within each, is one that a solver should begin with: of a vertex itself, at the first or the
+    /// last rate; all of them where there are few. The others may never matter.
+    pub fn leads(&self, block: usize) -> bool {
+        let (terms, rates) = (self.terms().len(), self.rates().len());
+        let (rate, term) = (block % (terms * rates) / terms, block % terms);
+        terms * rates <= FEW_BLOCKS || term < self.polytope.len() && (rate == 0 || rate + 1 == rates)
+    }
+
+    /// The term of a block: blocks of one term differ by the rate.
+    pub fn family(&self, block: usize) -> usize {
+        block % self.terms().len()
     }
 
     /// Where (i, j) is, in words.

@@ -228,8 +228,11 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
     let t = problem.scalar("margin");
     let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-    for (name, block) in sum.stability(&unknowns.l, &t) {
-        problem.positive_definite_by(name, block, 0.0);
+    for (k, (name, block)) in sum.stability(&unknowns.l, &t).into_iter().enumerate() {
+        match sum.leads(k) {
+            true => problem.positive_definite_by(name, block, 0.0),
+            false => problem.positive_definite_lazily(name, block, Some(0.0), sum.family(k)),
+        }
     }
     for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
         problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
@@ -363,8 +366,11 @@ fn stabilize_strictly(polytope: &Polytope, request: &PolytopicRequest) -> Result
     let mut strict = Problem::new();
     let unknowns = Unknowns::new(&mut strict, polytope, &request.lyapunov);
     let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-    for (name, block) in sum.stability(&unknowns.l, &Expr::zeros(1, 1)) {
-        strict.positive_definite(name, block);
+    for (k, (name, block)) in sum.stability(&unknowns.l, &Expr::zeros(1, 1)).into_iter().enumerate() {
+        match sum.leads(k) {
+            true => strict.positive_definite(name, block),
+            false => strict.positive_definite_lazily(name, block, None, sum.family(k)),
+        }
     }
     for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
         strict.positive_definite_by(format!("Y{} ⪰ I", i + 1), *y - Expr::identity(n), 0.0);
@@ -416,8 +422,11 @@ fn regulate(
         };
         (0..1usize << inputs).flat_map(of_mixture).collect()
     };
-    for (name, block) in performance(&unknowns.l) {
-        problem.positive_definite(name, block);
+    for (k, (name, block)) in performance(&unknowns.l).into_iter().enumerate() {
+        match sum.leads(k) {
+            true => problem.positive_definite(name, block),
+            false => problem.positive_definite_lazily(name, block, None, sum.family(k)),
+        }
     }
     for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
         problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());

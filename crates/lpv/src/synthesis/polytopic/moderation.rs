@@ -149,7 +149,7 @@ impl Stage<'_> {
 
     /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it.
     fn second(&self, first: &Answer, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
-        let points = self.least_effort(first.objective, share, options)?;
+        let points = self.least_effort(first, share, options)?;
         let has_point = |point: &&Answer| {
             point.outcome.is_optimal() || matches!(point.outcome, Outcome::Inaccurate(_)) && point.objective.is_finite()
         };
@@ -170,11 +170,12 @@ impl Stage<'_> {
         point.unknown_values()[..count].iter().enumerate().map(scaled).collect()
     }
 
-    /// Points of least effort with the share `share` of `optimum` given back, the better conditioned first, with the unknowns of the second
+    /// Points of least effort with the share `share` of the optimum of `first` given back, the better conditioned first, with the unknowns of the second
     /// stage after those of the first.
-    fn least_effort(&self, optimum: f64, share: f64, options: &Options) -> Result<Vec<Answer>, Error> {
+    fn least_effort(&self, first: &Answer, share: f64, options: &Options) -> Result<Vec<Answer>, Error> {
         let one = |value: f64| Expr::constant(Mat::from_fn(1, 1, |_, _| value));
-        let mut problem = self.problem.clone();
+        let optimum = first.objective;
+        let mut problem = self.problem.beginning_with(first);
         let tau = problem.scalar("effort");
         let sign = self.objective.sign();
         // so that what is made strict still is within the share

@@ -1,0 +1,183 @@
+//! Inequalities that are posed only where an answer breaks them.
+//!
+//! Of thousands of inequalities, as for the corners of a set of rates, a few dozen carry the optimum. A relaxed problem without the others is solved;
+//! those that its point breaks are posed too, the worst first, until it breaks none (constraint generation; in semi-infinite programming the
+//! exchange method, R. Hettich and K. Kortanek 1993). What is found is the optimum of the whole problem: a bound on the optimum of a relaxed problem, and a
+//! contradiction in one, are those of the whole.
+
+use crate::answer::{Answer, InaccurateReason, Outcome, Tolerance, Witness};
+use crate::problem::{Inequality, Problem};
+use crate::{Error, Expr, Mat, Options};
+use faer::Side;
+use std::collections::BTreeSet;
+
+/// Rounds after which everything is posed.
+const MOST_ROUNDS: usize = 40;
+/// Relative gap of the first rounds, and what it is multiplied by where nothing is broken.
+const FIRST_GAP: f64 = 1e-2;
+const NEXT_GAP: f64 = 1e-3;
+/// Of the largest trace of a multiplier: what carries less is taken back while the gap is wide.
+const IDLE: f64 = 2e-3;
+/// Of the worst violation: what is broken by less waits for the next round.
+const WORTH_POSING: f64 = 0.05;
+
+impl Problem {
+    /// Demands `F ≻ 0`, or `F ⪰ margin·I` as [`Self::positive_definite_by`] does, and poses it to the solver only where an answer without it breaks it.
+    /// For problems with hundreds of inequalities most of which do not matter; the answer is that of the whole problem. Of those of one `family`, which are
+    /// much alike, the worst is posed at a time.
+    pub fn positive_definite_lazily(
+        &mut self,
+        name: impl Into<String>,
+        expression: impl Into<Expr>,
+        margin: Option<f64>,
+        family: usize,
+    ) {
+        let (name, expression) = (name.into(), expression.into());
+        self.inequalities.push(Inequality { name, expression, margin, lazy: Some(family) });
+    }
+
+    /// The same problem, with the lazy inequalities that had to be posed for `answer` posed from the start.
+    pub fn beginning_with(&self, answer: &Answer) -> Self {
+        let mut problem = self.clone();
+        for (inequality, multiplier) in problem.inequalities.iter_mut().zip(&answer.multipliers) {
+            inequality.lazy = inequality.lazy.filter(|_| is_zero(multiplier));
+        }
+        problem
+    }
+
+    pub(crate) fn has_lazy(&self) -> bool {
+        self.inequalities.iter().any(|inequality| inequality.lazy.is_some())
+    }
+
+    /// The answer to the whole problem, in which nothing but the inequalities that are not lazy need be posed.
+    pub(crate) fn generate(&self, options: &Options) -> Result<Answer, Error> {
+        let mut posed: Vec<bool> = self.inequalities.iter().map(|inequality| inequality.lazy.is_none()).collect();
+        let mut iterations = Vec::new();
+        // what is broken far from the optimum is known from a point that is not yet there
+        let mut gap = options.gap_tolerance.max(FIRST_GAP);
+        let mut last = f64::INFINITY;
+        for round in 0.. {
+            if round == MOST_ROUNDS || !posed.contains(&true) {
+                posed.fill(true);
+            }
+            let mut answer = self.posing(&posed).solve(&Options { gap_tolerance: gap, ..options.clone() })?;
+            iterations.append(&mut answer.iterations);
+            let has_point = answer.outcome.is_optimal() || matches!(answer.outcome, Outcome::Inaccurate(_));
+            let broken = if has_point { self.broken(&posed, &answer, options) } else { Vec::new() };
+            let is_unbounded = matches!(answer.outcome, Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_));
+            if is_unbounded && posed.contains(&false) {
+                posed.fill(true);
+            } else if has_point && gap > options.gap_tolerance && (broken.is_empty() || !has_moved(last, &answer, gap)) {
+                gap = options.gap_tolerance.max(NEXT_GAP * gap);
+            } else if broken.is_empty() {
+                answer.iterations = iterations;
+                return Ok(self.completed(answer, &posed));
+            }
+            if gap == FIRST_GAP && !broken.is_empty() {
+                self.drop_idle(&mut posed, &answer.multipliers);
+            }
+            broken.into_iter().for_each(|block| posed[block] = true);
+            last = answer.objective;
+        }
+        unreachable!("everything is posed in the end, and then nothing is broken that is not posed")
+    }
+
+    /// The inequalities that are posed, alone and none of them lazy.
+    fn posing(&self, posed: &[bool]) -> Self {
+        let mut problem = self.clone();
+        let mut posed = posed.iter();
+        problem.inequalities.retain(|_| posed.next() == Some(&true));
+        problem.inequalities.iter_mut().for_each(|inequality| inequality.lazy = None);
+        problem
+    }
+
+    /// The inequalities that are not posed and that the point of `answer` breaks, the worst first.
+    fn broken(&self, posed: &[bool], answer: &Answer, options: &Options) -> Vec<usize> {
+        let violation = |inequality: &Inequality| {
+            // half of the margin that is imposed is enough to prove it by
+            let margin = 0.5 * inequality.margin.unwrap_or(options.default_margin(&inequality.expression.constant));
+            let f = answer.value(&inequality.expression);
+            let shifted = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] - if i == j { margin } else { 0.0 });
+            if shifted.llt(Side::Lower).is_ok() {
+                return 0.0;
+            }
+            let values = shifted.self_adjoint_eigenvalues(Side::Lower);
+            values.ok().and_then(|values| values.first().copied()).map_or(f64::INFINITY, |least| -least)
+        };
+        let waiting = self.inequalities.iter().enumerate().filter(|(block, _)| !posed[*block]);
+        let mut broken: Vec<(usize, f64)> = waiting.map(|(block, inequality)| (block, violation(inequality))).collect();
+        broken.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let worst = broken.first().map_or(0.0, |first| first.1);
+        let is_worth = |&(_, violation): &(usize, f64)| violation > 0.0 && violation >= WORTH_POSING * worst;
+        let mut families = BTreeSet::new();
+        let leads = |&(block, _): &(usize, f64)| families.insert(self.inequalities[block].lazy);
+        broken.into_iter().take_while(is_worth).filter(leads).map(|(block, _)| block).collect()
+    }
+
+    /// Takes back the lazy inequalities that carry next to nothing.
+    fn drop_idle(&self, posed: &mut [bool], multipliers: &[Mat<f64>]) {
+        let trace = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
+        let weights: Vec<f64> = multipliers.iter().map(trace).collect();
+        let least = IDLE * weights.iter().copied().fold(0.0, f64::max);
+        let mut weights = weights.into_iter();
+        for (posed, inequality) in posed.iter_mut().zip(&self.inequalities).filter(|(posed, _)| **posed) {
+            *posed = weights.next().is_none_or(|weight| weight > least) || inequality.lazy.is_none();
+        }
+    }
+
+    /// The answer as one of the whole problem: blocks that were not posed are proved, and have a multiplier of zero.
+    fn completed(&self, mut answer: Answer, posed: &[bool]) -> Answer {
+        let nothing = |inequality: &Inequality| {
+            let n = inequality.expression.nrows();
+            Mat::zeros(n, n)
+        };
+        let spread = |of: Vec<Mat<f64>>| -> Vec<Mat<f64>> {
+            let mut of = of.into_iter();
+            let each = self.inequalities.iter().zip(posed);
+            each.map(|(inequality, posed)| posed.then(|| of.next()).flatten().unwrap_or_else(|| nothing(inequality)))
+                .collect()
+        };
+        answer.multipliers = spread(std::mem::take(&mut answer.multipliers));
+        answer.centre = None;
+        if let Outcome::Infeasible(witness) | Outcome::InfeasibleWithin(witness) = &mut answer.outcome {
+            let multipliers = spread(std::mem::take(&mut witness.multipliers));
+            let smallest_eigenvalue = witness.smallest_eigenvalue.min(0.0);
+            *witness = Witness { multipliers, smallest_eigenvalue, ..witness.clone() };
+        }
+        let mut own = std::mem::take(&mut answer.blocks).into_iter();
+        // the values are the problem's own, so that their sizes fit
+        let all = self.verify(&answer.values).unwrap_or_default();
+        answer.blocks = all.into_iter().zip(posed).map(|(block, posed)| posed.then(|| own.next()).flatten().unwrap_or(block)).collect();
+        let waiting = answer.blocks.iter().zip(&self.inequalities).zip(posed).filter(|(_, posed)| !**posed);
+        // by how much each may miss what it demands; a strict one has to be proved strict
+        let missing = waiting.map(|((block, inequality), _)| {
+            let missing = inequality.margin.unwrap_or(0.0) - block.verified_lower_bound;
+            if inequality.margin.is_none() && missing >= 0.0 { f64::INFINITY } else { missing.max(0.0) }
+        });
+        let missing = missing.fold(0.0, f64::max);
+        if answer.outcome.is_optimal() && missing > 0.0 {
+            (answer.attained, answer.optimum_bound) = (None, None);
+            answer.outcome = match answer.outcome {
+                Outcome::SolvedToTolerance(Tolerance { violation, gap }) if missing.is_finite() => {
+                    Outcome::SolvedToTolerance(Tolerance { violation: violation.max(missing), gap })
+                }
+                _ if missing.is_finite() => {
+                    Outcome::SolvedToTolerance(Tolerance { violation: missing, gap: f64::INFINITY })
+                }
+                _ => Outcome::Inaccurate(InaccurateReason::NotVerified),
+            };
+        }
+        answer
+    }
+}
+
+/// Whether the objective moved by more than the gap lets see.
+fn has_moved(last: f64, answer: &Answer, gap: f64) -> bool {
+    // not so of a first round, nor of anything that is not a number
+    let least = gap * (1.0 + answer.objective.abs());
+    last.is_infinite() || (answer.objective - last).abs() > least
+}
+
+fn is_zero(matrix: &Mat<f64>) -> bool {
+    (0..matrix.ncols()).all(|j| matrix.col_as_slice(j).iter().all(|&entry| entry == 0.0))
+}
