@@ -11,6 +11,7 @@ use crate::answer::{Balancing, InaccurateReason, Residuals};
 use crate::block::Program;
 use crate::interior_point::{self, Ending, Solution};
 use std::borrow::Cow;
+use std::time::Instant;
 
 /// Rounds of conjugate gradients for the logarithms of the factors, which need no more than one digit.
 const ROUNDS: usize = 40;
@@ -64,7 +65,11 @@ pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) ->
         }
         solution
     };
-    let plain = (!wide).then(|| with_units(interior_point::solve(&program, options), &program));
+    let started = Instant::now();
+    let plain = (!wide).then(|| {
+        let solution = with_units(interior_point::solve(&program, options), &program);
+        if far_off(&solution, options) { solution } else { carried_on(&program, options, solution, started) }
+    });
     let plain = match plain {
         Some(solution) if !far_off(&solution, options) => return (solution, untouched),
         other => other,
@@ -84,6 +89,14 @@ pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) ->
         (Some(plain), _) => (plain, untouched),
         (None, None) => (interior_point::solve(&program, options), untouched),
     }
+}
+
+/// The solution in more digits where rounding errors stopped the iteration; as it was where that does not help.
+fn carried_on(program: &Program, options: &Options, solution: Solution, started: Instant) -> Solution {
+    if !matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled)) {
+        return solution;
+    }
+    interior_point::extended::solve(program, options, &solution, started).unwrap_or(solution)
 }
 
 /// Whether the iteration gave up far from an answer.
@@ -107,7 +120,9 @@ fn closer(a: &Solution, b: &Solution) -> bool {
 /// Scales the program, solves it, and gives the solution in the units of the program as it was; `None` where scaling overflows.
 fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> Option<Solution> {
     let omega = apply(program, factors)?;
-    let mut solution = interior_point::solve(program, options);
+    let started = Instant::now();
+    let solution = interior_point::solve(program, options);
+    let mut solution = carried_on(program, options, solution, started);
     let unscale = |x: &mut Vec<f64>| x.iter_mut().zip(&factors.unknowns).for_each(|(x, s)| *x *= s);
     unscale(&mut solution.point.x);
     solution.interior.iter_mut().for_each(unscale);

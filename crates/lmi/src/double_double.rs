@@ -42,6 +42,13 @@ pub(crate) fn add(a: Double, b: Double) -> Double {
     fast_two_sum(v.h, t.l + v.l)
 }
 
+/// a + b with an error of a few `UNIT`(|a| + |b|), in two thirds of the time: where a and b cancel, relative accuracy goes.
+#[inline(always)]
+pub(crate) fn accumulate(a: Double, b: Double) -> Double {
+    let s = two_sum(a.h, b.h);
+    fast_two_sum(s.h, s.l + (a.l + b.l))
+}
+
 #[inline(always)]
 pub(crate) fn multiply(a: Double, b: Double) -> Double {
     let p = two_product(a.h, b.h);

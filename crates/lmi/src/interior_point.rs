@@ -5,6 +5,7 @@
 //! or the unknowns by linear combinations, so that scaling matters for the starting point and the stopping rule only.
 
 mod certificate;
+pub(crate) mod extended;
 mod refinement;
 
 use crate::answer::{InaccurateReason, IterationLog, Residuals};
@@ -82,7 +83,7 @@ pub(crate) enum Ending {
 }
 
 /// The last or best point, and how it was reached.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Solution {
     pub point: Point,
     pub ending: Ending,

@@ -1,0 +1,162 @@
+//! The coefficients of one block, entry by entry, and what the iteration does with them.
+
+use super::matrix::{self, Matrix};
+use crate::block::Program;
+use crate::double_double::{self as dd, Double};
+
+/// The coefficient matrix of one unknown.
+#[derive(Debug)]
+struct Coefficient {
+    unknown: usize,
+    /// (row, column, value) with row ≥ column, no place twice.
+    entries: Vec<(usize, usize, Double)>,
+    /// Rows with entries, and the entries of the full symmetric matrix as (place among these rows, column, value).
+    support: Vec<usize>,
+    full: Vec<(usize, usize, Double)>,
+}
+
+impl Coefficient {
+    fn new(unknown: usize, mut entries: Vec<(usize, usize, Double)>) -> Self {
+        entries.sort_by_key(|&(i, j, _)| (j, i));
+        entries.dedup_by(|later, earlier| {
+            let same = (later.0, later.1) == (earlier.0, earlier.1);
+            if same {
+                earlier.2 = dd::add(earlier.2, later.2);
+            }
+            same
+        });
+        entries.retain(|(_, _, value)| value.h != 0.0);
+        let mut support: Vec<usize> = entries.iter().flat_map(|&(i, j, _)| [i, j]).collect();
+        support.sort_unstable();
+        support.dedup();
+        let place = |row: usize| support.partition_point(|&r| r < row);
+        let mirrored = |&(i, j, value): &(usize, usize, Double)| {
+            let other = (i != j).then(|| (place(j), i, value));
+            std::iter::once((place(i), j, value)).chain(other)
+        };
+        let full = entries.iter().flat_map(mirrored).collect();
+        Self { unknown, entries, support, full }
+    }
+}
+
+/// One block: n × n with its known part and coefficients. Every row of a diagonal block is a block of its own.
+#[derive(Debug)]
+pub(super) struct Operator {
+    pub n: usize,
+    pub constant: Matrix,
+    coefficients: Vec<Coefficient>,
+}
+
+/// Where a block of the program comes to stand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Its first operator, and how many it has become.
+    pub first: usize,
+    pub count: usize,
+}
+
+/// The blocks of a program with the unknowns in its units.
+pub(super) fn operators(program: &Program) -> (Vec<Operator>, Vec<Place>) {
+    let (mut operators, mut places) = (Vec::new(), Vec::new());
+    for block in &program.blocks {
+        let size = block.size();
+        let (count, n) = if block.is_diagonal() { (size, 1) } else { (1, size) };
+        let mut entries: Vec<Vec<(usize, usize, usize, Double)>> = vec![Vec::new(); count];
+        block.coefficients(&mut |i, j, unknown, value| {
+            if let Some(unknown) = unknown
+                && value != 0.0
+            {
+                let value = Double { h: value * program.scale[unknown], l: 0.0 };
+                let (operator, i, j) = if block.is_diagonal() { (i, 0, 0) } else { (0, i, j) };
+                entries[operator].push((unknown, i.max(j), i.min(j), value));
+            }
+        });
+        places.push(Place { first: operators.len(), count });
+        for (row, mut entries) in entries.into_iter().enumerate() {
+            entries.sort_by_key(|e| e.0);
+            let of = |group: &[(usize, usize, usize, Double)]| {
+                Coefficient::new(group[0].0, group.iter().map(|&(_, i, j, value)| (i, j, value)).collect())
+            };
+            let coefficients = entries.chunk_by(|a, b| a.0 == b.0).map(of).collect();
+            let constant = if block.is_diagonal() { &block.constant()[row..=row] } else { block.constant() };
+            operators.push(Operator { n, constant: Matrix::of(constant), coefficients });
+        }
+    }
+    (operators, places)
+}
+
+/// Working memory for the rows of the Schur complement.
+#[derive(Debug)]
+pub(super) struct Workspace {
+    of_z: Matrix,
+    product: Matrix,
+}
+
+impl Operator {
+    pub fn workspace(&self) -> Workspace {
+        let most = self.coefficients.iter().map(|c| c.support.len()).max().unwrap_or(0);
+        Workspace { of_z: Matrix::zeros(most * self.n), product: Matrix::zeros(self.n * self.n) }
+    }
+
+    /// Multiplications for the block's part of one Schur complement, about.
+    pub fn work(&self) -> f64 {
+        let n = self.n as f64;
+        let product = |c: &Coefficient| (c.full.len() as f64 + c.support.len() as f64 * n) * n;
+        let meets: f64 = self.coefficients.iter().map(|c| c.entries.len() as f64).sum();
+        let all: f64 = self.coefficients.iter().map(product).sum();
+        all + 4.0 * meets * self.coefficients.len() as f64 + 20.0 * n.powi(3)
+    }
+
+    /// out ← out + Σ xᵢFᵢ.
+    pub fn apply(&self, x: &Matrix, out: &mut Matrix) {
+        let n = self.n;
+        for c in &self.coefficients {
+            let x = x.get(c.unknown);
+            for &(i, j, value) in &c.entries {
+                let term = dd::multiply(value, x);
+                out.set(i + j * n, dd::accumulate(out.get(i + j * n), term));
+                if i != j {
+                    out.set(j + i * n, dd::accumulate(out.get(j + i * n), term));
+                }
+            }
+        }
+    }
+
+    /// outᵢ ← outᵢ + factor·⟨Fᵢ, H⟩ for symmetric H.
+    pub fn adjoint(&self, factor: f64, h: &Matrix, out: &mut Matrix) {
+        for c in &self.coefficients {
+            let sum = inner(&c.entries, self.n, h);
+            out.set(c.unknown, dd::accumulate(out.get(c.unknown), dd::multiply_by(sum, factor)));
+        }
+    }
+
+    /// Adds tr(FᵢPFⱼZ) to the lower triangle of the N × N matrix m.
+    pub fn schur(&self, p: &Matrix, z: &Matrix, unknowns: usize, m: &mut Matrix, workspace: &mut Workspace) {
+        let n = self.n;
+        for (at, c) in self.coefficients.iter().enumerate() {
+            let Workspace { of_z, product } = workspace;
+            of_z.fill_zero();
+            for &(place, j, value) in &c.full {
+                matrix::add_column(n, value, (z, j), (of_z, place));
+            }
+            matrix::outer(n, p, &c.support, of_z, product);
+            product.symmetrize(n);
+            for other in &self.coefficients[at..] {
+                let entry = inner(&other.entries, n, product);
+                let (i, j) = (c.unknown.max(other.unknown), c.unknown.min(other.unknown));
+                let place = i + j * unknowns;
+                m.set(place, dd::accumulate(m.get(place), entry));
+            }
+        }
+    }
+}
+
+/// ⟨F, H⟩ for symmetric H.
+fn inner(entries: &[(usize, usize, Double)], n: usize, h: &Matrix) -> Double {
+    let mut sum = Double::default();
+    for &(i, j, value) in entries {
+        let value = if i == j { value } else { Double { h: 2.0 * value.h, l: 2.0 * value.l } };
+        sum = dd::accumulate(sum, dd::multiply(value, h.get(i + j * n)));
+    }
+    sum
+}
