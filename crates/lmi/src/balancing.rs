@@ -91,12 +91,28 @@ pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) ->
     }
 }
 
+/// Solves a program, balanced, in more digits from the beginning: for what looked infeasible or unbounded and is not proved to be. `None` where that leads nowhere.
+pub(crate) fn solve_in_more_digits(
+    mut program: Program,
+    margins: &[f64],
+    options: &Options,
+) -> Option<(Solution, Balancing)> {
+    let equations = equations(&program);
+    let factors = factors(&program, &equations);
+    let balancing = Balancing { before: range(&equations), after: range_after(&equations, &factors) };
+    program.blocks.iter_mut().zip(margins).for_each(|(block, margin)| block.subtract(*margin));
+    program.warm = None;
+    let omega = apply(&mut program, &factors)?;
+    let solution = interior_point::extended::solve(&program, options, None, Instant::now())?;
+    Some((unscaled(&program, &factors, omega, solution), balancing))
+}
+
 /// The solution in more digits where rounding errors stopped the iteration; as it was where that does not help.
 fn carried_on(program: &Program, options: &Options, solution: Solution, started: Instant) -> Solution {
     if !matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled)) {
         return solution;
     }
-    interior_point::extended::solve(program, options, &solution, started).unwrap_or(solution)
+    interior_point::extended::solve(program, options, Some(&solution), started).unwrap_or(solution)
 }
 
 /// Whether the iteration gave up far from an answer.
@@ -122,7 +138,12 @@ fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> 
     let omega = apply(program, factors)?;
     let started = Instant::now();
     let solution = interior_point::solve(program, options);
-    let mut solution = carried_on(program, options, solution, started);
+    let solution = carried_on(program, options, solution, started);
+    Some(unscaled(program, factors, omega, solution))
+}
+
+/// A solution of the scaled program in the units of the program as it was.
+fn unscaled(program: &Program, factors: &Factors, omega: f64, mut solution: Solution) -> Solution {
     let unscale = |x: &mut Vec<f64>| x.iter_mut().zip(&factors.unknowns).for_each(|(x, s)| *x *= s);
     unscale(&mut solution.point.x);
     solution.interior.iter_mut().for_each(unscale);
@@ -144,7 +165,7 @@ fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> 
         entry.objective /= omega;
         entry.dual_objective /= omega;
     }
-    Some(solution)
+    solution
 }
 
 /// Gives every entry of every block's matrix to `scaled` with its factor dᵢdⱼ.

@@ -83,7 +83,7 @@ pub(crate) enum Ending {
 }
 
 /// The last or best point, and how it was reached.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Solution {
     pub point: Point,
     pub ending: Ending,

@@ -24,11 +24,13 @@ use std::time::Instant;
 /// Most multiplications for one iteration: a few tenths of a second.
 const MOST_WORK: f64 = 1e8;
 /// What is added to the unit diagonal of M where its factorisation does not exist: the least, the factor, the most.
-const REGULARIZATION: [f64; 3] = [1e-31, 1e3, 1e-21];
+const REGULARIZATION: [f64; 3] = [1e-30, 1e3, 1e-14];
 /// Iterations without progress.
 const PATIENCE: usize = 15;
 /// Primal residual from which on S is replaced by F(x).
 const CLOSE: f64 = 1e-7;
+
+const DBG: bool = option_env!("DBG").is_some();
 
 /// One block.
 struct State {
@@ -173,19 +175,19 @@ struct Iteration<'a> {
 }
 
 /// The solution of a program that the iteration in `f64` did not get far enough with; `None` where this one does not either, or would take too long.
-pub(crate) fn solve(program: &Program, options: &Options, stopped: &Solution, started: Instant) -> Option<Solution> {
+pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solution>, started: Instant) -> Option<Solution> {
     let (operators, places) = operators(program);
     let unknowns = program.objective.len() as f64;
     let work = operators.iter().map(Operator::work).sum::<f64>() + unknowns.powi(3) / 6.0;
     if work > MOST_WORK {
         return None;
     }
-    let mut it = Iteration::new(program, operators, &places, stopped.centre.as_ref());
+    let centre = stopped.and_then(|stopped| stopped.centre.as_ref());
+    let mut it = Iteration::new(program, operators, &places, centre);
     let mut log: Vec<IterationLog> = Vec::new();
     let mut sizes = Vec::new();
-    let mut solution =
-        Solution { point: Point::default(), interior: None, inner: None, centre: stopped.centre.clone(), ..stopped.clone() };
-    let (mut best, mut since_progress) = (f64::INFINITY, 0);
+    let (mut interior, mut inner) = (None, None);
+    let (mut best, mut since_progress) = ([f64::INFINITY; 3], 0);
     loop {
         it.update_residuals();
         let status = it.status();
@@ -201,10 +203,10 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: &Solution, st
         });
         sizes.push(it.x.norm());
         if it.feasible && gap > BACK_OFF {
-            solution.interior = Some(it.x.h.clone());
+            interior = Some(it.x.h.clone());
         }
         if dual <= INNER * options.feasibility_tolerance && gap > BACK_OFF && gap <= CENTRAL {
-            solution.inner = Some(it.multipliers(&places));
+            inner = Some(it.multipliers(&places));
         }
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
         let tolerance = options.feasibility_tolerance;
@@ -212,8 +214,12 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: &Solution, st
             break;
         }
         let merit = status.merit(options);
-        since_progress = if merit < 0.9 * best { 0 } else { since_progress + 1 };
-        best = best.min(merit);
+        if DBG { eprintln!("DBG {} {status:?}", log.len()); }
+        // Far from feasible, the gap grows for a while.
+        let now = [merit, primal.max(tolerance), dual.max(tolerance)];
+        let progress = now.iter().zip(&best).any(|(now, best)| *now < 0.9 * best);
+        since_progress = if progress { 0 } else { since_progress + 1 };
+        best.iter_mut().zip(now).for_each(|(best, now)| *best = best.min(now));
         let cancelled = options.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
         let late = options.time_limit.is_some_and(|limit| started.elapsed() >= limit);
         if cancelled || late || since_progress > PATIENCE || log.len() > options.max_iterations {
@@ -224,19 +230,28 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: &Solution, st
             (entry.centring, entry.primal_step, entry.dual_step) = (centring, primal_step, dual_step);
         }
     }
-    // What is given away is rounded, and so are its residuals.
+    // What is given away is rounded, and so are its residuals. By how much that misses the dual equations depends on the units of Z; what it is worth
+    // against x says the uncertainty.
     it.round();
     it.update_residuals();
     let status = it.status();
-    if status.merit(options) > 1.0 || unattained(&log, &sizes, &Ending::Converged, options) {
+    let worth = Status { residuals: Residuals { dual: 0.0, ..status.residuals }, ..status };
+    if DBG { eprintln!("DBG rounded {status:?} {}", unattained(&log, &sizes, &Ending::Converged, options)); }
+    if worth.merit(options) > 1.0 || unattained(&log, &sizes, &Ending::Converged, options) {
         return None;
     }
-    solution.point = Point { x: it.x.h.clone(), z: it.multipliers(&places) };
-    solution.ending = Ending::Converged;
-    solution.residuals = status.residuals;
-    solution.dual_objective = status.dual_objective;
-    solution.log.extend(log);
-    Some(solution)
+    let before = stopped.map_or(&[][..], |stopped| &stopped.log);
+    Some(Solution {
+        point: Point { x: it.x.h.clone(), z: it.multipliers(&places) },
+        ending: Ending::Converged,
+        residuals: status.residuals,
+        dual_objective: status.dual_objective,
+        interior,
+        inner,
+        centre: centre.cloned(),
+        units: program.scale.clone(),
+        log: before.iter().copied().chain(log).collect(),
+    })
 }
 
 impl<'a> Iteration<'a> {
@@ -335,7 +350,9 @@ impl<'a> Iteration<'a> {
     }
 
     fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
-        if !self.states.iter_mut().all(State::factorize) || !self.factorize() {
+        if !self.states.iter_mut().all(State::factorize) { return None; }
+        if !self.factorize() {
+            if DBG { eprintln!("DBG no M"); }
             return None;
         }
         self.direction(None);
@@ -347,6 +364,7 @@ impl<'a> Iteration<'a> {
         self.direction(Some(sigma * status.mu));
         let fraction = 0.9 + 0.098 * primal.min(dual);
         let [primal, dual] = self.longest_steps().map(|step| (fraction * step).min(1.0));
+        if DBG { eprintln!("DBG sigma {sigma:e} steps {primal} {dual}"); }
         let primal = self.safeguard(primal, false)?;
         let dual = self.safeguard(dual, true)?;
         let [of_primal, of_dual] = [primal, dual].map(|h| Double { h, l: 0.0 });
@@ -395,6 +413,7 @@ impl<'a> Iteration<'a> {
             if matrix::cholesky(n, &mut self.m) {
                 return true;
             }
+            if DBG { eprintln!("DBG regularization {regularization:e}"); }
             regularization = if regularization == 0.0 { least } else { factor * regularization };
             if regularization > most {
                 return false;
@@ -433,6 +452,7 @@ impl<'a> Iteration<'a> {
     fn safeguard(&mut self, mut step: f64, dual: bool) -> Option<f64> {
         for _ in 0..40 {
             if step.is_nan() || step < 1e-9 {
+                if DBG { eprintln!("DBG no step {dual} {step}"); }
                 return None;
             }
             if self.states.iter_mut().all(|state| state.stays(dual, step)) {
