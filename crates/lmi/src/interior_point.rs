@@ -24,6 +24,9 @@ const BACK_OFF: f64 = 1e-6;
 /// Largest relative gap of a point that is called solved, and what the dual residual may take from it.
 pub(crate) const SOLVED_GAP: f64 = 1e-7;
 const SOLVED_UNCERTAINTY: f64 = 1e-6;
+/// An optimum smaller than this is to be told to [`SOLVED_GAP`] of itself, which so many more iterations may be spent on.
+const SMALL: f64 = 1e-2;
+const MORE: usize = 3;
 /// Dual residual of multipliers that are kept for proofs, against the tolerance.
 const INNER: f64 = 1e-2;
 /// Relative gap at which a point is kept for neighbouring problems to begin at.
@@ -149,6 +152,12 @@ impl Status {
         let merit = nan_max(feasibility, nan_max(gap / SOLVED_GAP, uncertainty / SOLVED_UNCERTAINTY));
         if merit.is_nan() { f64::INFINITY } else { merit }
     }
+
+    /// Whether the gap is closed against the objectives themselves, where they are small against the unit.
+    fn resolves(&self, unit: f64) -> bool {
+        let size = self.objective.abs() + self.dual_objective.abs();
+        size >= SMALL * unit || self.residuals.gap * (unit + size) <= SOLVED_GAP * size
+    }
 }
 
 /// Solves a program in the solver's form.
@@ -181,7 +190,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let mut log: Vec<IterationLog> = Vec::new();
     let mut best: Option<(f64, Status)> = None;
     let mut point = Point::default();
-    let mut since_progress = 0;
+    let (mut since_progress, mut more) = (0, 0);
     let mut best_witness = f64::INFINITY;
     let mut interior = None;
     let mut inner = None;
@@ -221,7 +230,10 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         let tolerance = options.feasibility_tolerance;
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
         if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance && certain {
-            break Ending::Converged;
+            if more == MORE || it.objective_norm == 0.0 || status.resolves(it.unit) {
+                break Ending::Converged;
+            }
+            more += 1;
         }
         let witness = it.witness_residual(&status);
         if witness <= CERTIFICATE || (witness <= NEAR_CERTIFICATE && it.complete_witness()) {

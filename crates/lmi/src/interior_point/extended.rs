@@ -10,7 +10,7 @@ mod matrix;
 mod operator;
 
 use super::{
-    BACK_OFF, CENTRAL, Centre, Ending, INNER, Point, SOLVED_GAP, SOLVED_UNCERTAINTY, Solution, Status, nan_max, unattained,
+    BACK_OFF, CENTRAL, Centre, Ending, INNER, MORE, Point, SOLVED_GAP, SOLVED_UNCERTAINTY, Solution, Status, nan_max, unattained,
 };
 use crate::answer::{IterationLog, Residuals};
 use crate::block::Program;
@@ -187,7 +187,7 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
     let mut log: Vec<IterationLog> = Vec::new();
     let mut sizes = Vec::new();
     let (mut interior, mut inner) = (None, None);
-    let (mut best, mut since_progress) = ([f64::INFINITY; 3], 0);
+    let (mut best, mut since_progress, mut more) = ([f64::INFINITY; 3], 0, 0);
     loop {
         it.update_residuals();
         let status = it.status();
@@ -211,7 +211,10 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
         let tolerance = options.feasibility_tolerance;
         if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance && certain {
-            break;
+            if more == MORE || it.objective_norm == 0.0 || status.resolves(it.unit) {
+                break;
+            }
+            more += 1;
         }
         let merit = status.merit(options);
         if DBG { eprintln!("DBG {} {status:?}", log.len()); }
