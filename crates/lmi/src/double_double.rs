@@ -15,14 +15,14 @@ pub(crate) struct Double {
 
 /// a + b exactly, for |a| ≥ |b| or a = 0.
 #[inline(always)]
-fn fast_two_sum(a: f64, b: f64) -> Double {
+pub(crate) fn fast_two_sum(a: f64, b: f64) -> Double {
     let h = a + b;
     Double { h, l: b - (h - a) }
 }
 
 /// a + b exactly.
 #[inline(always)]
-fn two_sum(a: f64, b: f64) -> Double {
+pub(crate) fn two_sum(a: f64, b: f64) -> Double {
     let h = a + b;
     let t = h - a;
     Double { h, l: (a - (h - t)) + (b - t) }

@@ -31,6 +31,11 @@ const MORE: usize = 3;
 const INNER: f64 = 1e-2;
 /// Relative gap at which a point is kept for neighbouring problems to begin at.
 const CENTRAL: f64 = 3e-2;
+/// Iterations without progress, and those after which the iteration in more digits carries on if it can.
+const PATIENCE: usize = 15;
+const LITTLE_PATIENCE: usize = 4;
+/// Steps after which a point is well inside.
+const EVEN: f64 = 0.5;
 /// Where x still grows by this factor in each of so many last iterations, as the gap closes or until no progress is made, no x attains the
 /// optimum: close to one that is attained x hardly moves.
 const GROWTH: f64 = 1.1;
@@ -56,7 +61,7 @@ pub(crate) struct Point {
 }
 
 /// A point on the way, well inside: where the iteration of a neighbouring problem may begin.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Centre {
     pub x: Vec<f64>,
     pub s: Vec<Vec<f64>>,
@@ -98,6 +103,8 @@ pub(crate) struct Solution {
     pub inner: Option<Vec<Vec<f64>>>,
     /// Where a neighbouring problem may begin.
     pub centre: Option<Centre>,
+    /// The last point before rounding errors told, in the units of the program that was solved: where more digits may carry on.
+    pub sound: Option<Centre>,
     /// Sensible units of the unknowns.
     pub units: Vec<f64>,
     pub log: Vec<IterationLog>,
@@ -195,6 +202,8 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let mut interior = None;
     let mut inner = None;
     let mut centre = None;
+    let mut sound = None;
+    let mut even = false;
     // ‖x‖ of every iteration.
     let mut sizes: Vec<f64> = Vec::new();
     let ending = loop {
@@ -226,6 +235,9 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         if it.feasible && gap <= CENTRAL && centre.is_none() {
             centre = Some(it.centre());
         }
+        if it.feasible && even && gap <= CENTRAL && dual <= options.feasibility_tolerance && uncertainty <= gap {
+            it.copy_centre(sound.get_or_insert_default());
+        }
         sizes.push(norm(&it.x));
         let tolerance = options.feasibility_tolerance;
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
@@ -248,8 +260,9 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         }
         since_progress = if much || witness < 0.9 * best_witness { 0 } else { since_progress + 1 };
         best_witness = best_witness.min(witness);
-        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) { 1 } else { 15 };
-        if since_progress > patience {
+        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) { 1 } else { PATIENCE };
+        let in_vain = since_progress == LITTLE_PATIENCE && sound.is_some() && extended::takes(program);
+        if since_progress > patience || in_vain {
             break Ending::Stopped(InaccurateReason::Stalled);
         }
         if let Some(reason) = it.interrupted(log.len(), started) {
@@ -257,6 +270,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         }
         match it.step(&status) {
             Some((centring, primal_step, dual_step)) => {
+                even = primal_step.min(dual_step) >= EVEN;
                 if let Some(entry) = log.last_mut() {
                     (entry.centring, entry.primal_step, entry.dual_step) = (centring, primal_step, dual_step);
                 }
@@ -285,7 +299,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let status = best.map_or_else(|| it.status(), |(_, status)| status);
     let units = program.scale.clone();
     let Status { residuals, dual_objective, .. } = status;
-    Solution { point, ending, residuals, dual_objective, interior, inner, centre, units, log }
+    Solution { point, ending, residuals, dual_objective, interior, inner, centre, sound, units, log }
 }
 
 /// Whether the objective came closer to its bound only as x grew, from the norms of x in each iteration.
@@ -351,8 +365,16 @@ impl<'a> Iteration<'a> {
     }
 
     fn centre(&self) -> Centre {
-        let of = |part: fn(&BlockState) -> &Vec<f64>| self.blocks.iter().map(|b| part(b).clone()).collect();
-        Centre { x: self.x.clone(), s: of(|b| &b.s), z: of(|b| &b.z) }
+        let mut centre = Centre::default();
+        self.copy_centre(&mut centre);
+        centre
+    }
+
+    fn copy_centre(&self, to: &mut Centre) {
+        copy(&self.x, &mut to.x);
+        to.s.resize_with(self.blocks.len(), Vec::new);
+        to.s.iter_mut().zip(&self.blocks).for_each(|(to, block)| copy(&block.s, to));
+        self.copy_multipliers(&mut to.z);
     }
 
     fn copy_point(&self, to: &mut Point) {

@@ -27,10 +27,11 @@ const MOST_WORK: f64 = 1e8;
 const REGULARIZATION: [f64; 3] = [1e-30, 1e3, 1e-14];
 /// Iterations without progress.
 const PATIENCE: usize = 15;
+/// A gap that falls by less than this factor in so many iterations is closed as far as need be, and not as far as asked for.
+const SLOW: f64 = 0.1;
+const FEW: usize = 3;
 /// Primal residual from which on S is replaced by F(x).
 const CLOSE: f64 = 1e-7;
-
-const DBG: bool = option_env!("DBG").is_some();
 
 /// One block.
 struct State {
@@ -167,7 +168,11 @@ struct Iteration<'a> {
     dx: Matrix,
     /// c − A(Z).
     misses: Matrix,
+    /// M, and its factor.
+    assembled: Matrix,
     m: Matrix,
+    /// What the last factorisation took.
+    regularization: f64,
     /// Powers of two that bring the diagonal of M near 1.
     scale: Vec<f64>,
     order: f64,
@@ -177,12 +182,10 @@ struct Iteration<'a> {
 /// The solution of a program that the iteration in `f64` did not get far enough with; `None` where this one does not either, or would take too long.
 pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solution>, started: Instant) -> Option<Solution> {
     let (operators, places) = operators(program);
-    let unknowns = program.objective.len() as f64;
-    let work = operators.iter().map(Operator::work).sum::<f64>() + unknowns.powi(3) / 6.0;
-    if work > MOST_WORK {
+    if !within_reach(program, &operators) {
         return None;
     }
-    let centre = stopped.and_then(|stopped| stopped.centre.as_ref());
+    let centre = stopped.and_then(|stopped| stopped.sound.as_ref().or(stopped.centre.as_ref()));
     let mut it = Iteration::new(program, operators, &places, centre);
     let mut log: Vec<IterationLog> = Vec::new();
     let mut sizes = Vec::new();
@@ -216,8 +219,12 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
             }
             more += 1;
         }
+        // Without an interior the gap closes slowly to the end.
+        let slow = log.len() > FEW && gap > SLOW * log[log.len() - 1 - FEW].residuals.gap;
         let merit = status.merit(options);
-        if DBG { eprintln!("DBG {} {status:?}", log.len()); }
+        if slow && merit <= 0.5 && certain {
+            break;
+        }
         // Far from feasible, the gap grows for a while.
         let now = [merit, primal.max(tolerance), dual.max(tolerance)];
         let progress = now.iter().zip(&best).any(|(now, best)| *now < 0.9 * best);
@@ -239,7 +246,6 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
     it.update_residuals();
     let status = it.status();
     let worth = Status { residuals: Residuals { dual: 0.0, ..status.residuals }, ..status };
-    if DBG { eprintln!("DBG rounded {status:?} {}", unattained(&log, &sizes, &Ending::Converged, options)); }
     if worth.merit(options) > 1.0 || unattained(&log, &sizes, &Ending::Converged, options) {
         return None;
     }
@@ -251,10 +257,21 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
         dual_objective: status.dual_objective,
         interior,
         inner,
-        centre: centre.cloned(),
+        centre: stopped.and_then(|stopped| stopped.centre.clone()),
+        sound: None,
         units: program.scale.clone(),
         log: before.iter().copied().chain(log).collect(),
     })
+}
+
+/// Whether the iteration in more digits takes on a program.
+pub(super) fn takes(program: &Program) -> bool {
+    within_reach(program, &operators(program).0)
+}
+
+fn within_reach(program: &Program, operators: &[Operator]) -> bool {
+    let unknowns = program.objective.len() as f64;
+    operators.iter().map(Operator::work).sum::<f64>() + unknowns.powi(3) / 6.0 <= MOST_WORK
 }
 
 impl<'a> Iteration<'a> {
@@ -294,7 +311,9 @@ impl<'a> Iteration<'a> {
             x: centre.map_or_else(|| Matrix::zeros(unknowns), |centre| Matrix::of(&centre.x)),
             dx: Matrix::zeros(unknowns),
             misses: Matrix::zeros(unknowns),
+            assembled: Matrix::zeros(unknowns * unknowns),
             m: Matrix::zeros(unknowns * unknowns),
+            regularization: 0.0,
             scale: vec![0.0; unknowns],
             feasible: centre.is_some(),
         }
@@ -355,7 +374,6 @@ impl<'a> Iteration<'a> {
     fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
         if !self.states.iter_mut().all(State::factorize) { return None; }
         if !self.factorize() {
-            if DBG { eprintln!("DBG no M"); }
             return None;
         }
         self.direction(None);
@@ -367,7 +385,6 @@ impl<'a> Iteration<'a> {
         self.direction(Some(sigma * status.mu));
         let fraction = 0.9 + 0.098 * primal.min(dual);
         let [primal, dual] = self.longest_steps().map(|step| (fraction * step).min(1.0));
-        if DBG { eprintln!("DBG sigma {sigma:e} steps {primal} {dual}"); }
         let primal = self.safeguard(primal, false)?;
         let dual = self.safeguard(dual, true)?;
         let [of_primal, of_dual] = [primal, dual].map(|h| Double { h, l: 0.0 });
@@ -383,10 +400,11 @@ impl<'a> Iteration<'a> {
     /// The Cholesky factor of M, scaled, in its place.
     fn factorize(&mut self) -> bool {
         let n = self.objective.len();
-        let mut m = Matrix::zeros(n * n);
+        let m = &mut self.assembled;
+        m.fill_zero();
         for (state, operator) in self.states.iter_mut().zip(&self.operators) {
             let State { s_inverse, z, workspace, .. } = state;
-            operator.schur(s_inverse, z, n, &mut m, workspace);
+            operator.schur(s_inverse, z, n, m, workspace);
         }
         for (i, scale) in self.scale.iter_mut().enumerate() {
             let entry = m.h[i + i * n];
@@ -406,17 +424,21 @@ impl<'a> Iteration<'a> {
             }
         }
         let [least, factor, most] = REGULARIZATION;
-        let mut regularization = 0.0;
+        // What was too little before is not tried again, but for one step.
+        let mut regularization = self.regularization / factor;
+        if regularization < least {
+            regularization = 0.0;
+        }
         loop {
-            self.m.copy_from(&m);
+            self.m.copy_from(m);
             for j in 0..n {
                 let at = j + j * n;
                 self.m.set(at, dd::add(self.m.get(at), Double { h: regularization, l: 0.0 }));
             }
             if matrix::cholesky(n, &mut self.m) {
+                self.regularization = regularization;
                 return true;
             }
-            if DBG { eprintln!("DBG regularization {regularization:e}"); }
             regularization = if regularization == 0.0 { least } else { factor * regularization };
             if regularization > most {
                 return false;
@@ -455,7 +477,6 @@ impl<'a> Iteration<'a> {
     fn safeguard(&mut self, mut step: f64, dual: bool) -> Option<f64> {
         for _ in 0..40 {
             if step.is_nan() || step < 1e-9 {
-                if DBG { eprintln!("DBG no step {dual} {step}"); }
                 return None;
             }
             if self.states.iter_mut().all(|state| state.stays(dual, step)) {

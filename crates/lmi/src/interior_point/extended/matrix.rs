@@ -105,6 +105,29 @@ fn add_scaled(a: Double, [xh, xl]: [&[f64]; 2], [yh, yl]: [&mut [f64]; 2]) {
     }
 }
 
+/// Columns that are added at once.
+const WIDTH: usize = 4;
+
+/// y ← y + Σ aₖxₖ. Low parts are only put in order at the end.
+#[inline(always)]
+fn add_several(a: [Double; WIDTH], x: [[&[f64]; 2]; WIDTH], [yh, yl]: [&mut [f64]; 2]) {
+    let len = yh.len();
+    let yl = &mut yl[..len];
+    let x = x.map(|[h, l]| [&h[..len], &l[..len]]);
+    for i in 0..len {
+        let (mut h, mut l) = (yh[i], yl[i]);
+        for k in 0..WIDTH {
+            let ([xh, xl], a) = (x[k], a[k]);
+            let product = dd::two_product(xh[i], a.h);
+            let sum = dd::two_sum(h, product.h);
+            h = sum.h;
+            l += sum.l + xl[i].mul_add(a.h, xh[i].mul_add(a.l, product.l));
+        }
+        let sum = dd::fast_two_sum(h, l);
+        (yh[i], yl[i]) = (sum.h, sum.l);
+    }
+}
+
 vectorized! {
     fn axpy<'a>(a: Double, x: [&'a [f64]; 2], y: [&'a mut [f64]; 2]) {
         add_scaled(a, x, y);
@@ -125,13 +148,16 @@ vectorized! {
         let [ch, cl] = c;
         for j in 0..columns {
             let column = j * rows..(j + 1) * rows;
-            for (k, &at) in picked.iter().enumerate() {
-                let factor = Double { h: b[0][j + k * columns], l: b[1][j + k * columns] };
-                if factor.h == 0.0 {
-                    continue;
-                }
-                let of_a = at * rows..(at + 1) * rows;
-                add_scaled(factor, [&a[0][of_a.clone()], &a[1][of_a]], [&mut ch[column.clone()], &mut cl[column.clone()]]);
+            let of_a = |at: usize| [&a[0][at * rows..(at + 1) * rows], &a[1][at * rows..(at + 1) * rows]];
+            let factor = |k: usize| Double { h: b[0][j + k * columns], l: b[1][j + k * columns] };
+            let whole = picked.len() / WIDTH * WIDTH;
+            for first in (0..whole).step_by(WIDTH) {
+                let factors = std::array::from_fn(|k| factor(first + k));
+                let of_a = std::array::from_fn(|k| of_a(picked[first + k]));
+                add_several(factors, of_a, [&mut ch[column.clone()], &mut cl[column.clone()]]);
+            }
+            for (k, &at) in picked.iter().enumerate().skip(whole) {
+                add_scaled(factor(k), of_a(at), [&mut ch[column.clone()], &mut cl[column.clone()]]);
             }
         }
     }
@@ -162,26 +188,39 @@ pub(super) fn cholesky(n: usize, m: &mut Matrix) -> bool {
 
 vectorized! {
     fn factorize<'a>(n: usize, high: &'a mut [f64], low: &'a mut [f64]) -> bool {
-        for k in 0..n {
-            let pivot = Double { h: high[k + k * n], l: low[k + k * n] };
-            if !(pivot.h > 0.0 && pivot.h.is_finite()) {
-                return false;
-            }
-            let inverse = dd::reciprocal(dd::square_root(pivot));
-            for i in k..n {
-                let entry = dd::multiply(Double { h: high[i + k * n], l: low[i + k * n] }, inverse);
-                (high[i + k * n], low[i + k * n]) = (entry.h, entry.l);
-            }
-            let (done_high, left_high) = high.split_at_mut((k + 1) * n);
-            let (done_low, left_low) = low.split_at_mut((k + 1) * n);
-            let (lh, ll) = (&done_high[k * n..], &done_low[k * n..]);
-            for j in k + 1..n {
-                let factor = Double { h: -lh[j], l: -ll[j] };
-                if factor.h == 0.0 {
-                    continue;
+        for first in (0..n).step_by(WIDTH) {
+            let last = (first + WIDTH).min(n);
+            for k in first..last {
+                let pivot = Double { h: high[k + k * n], l: low[k + k * n] };
+                if !(pivot.h > 0.0 && pivot.h.is_finite()) {
+                    return false;
                 }
-                let at = (j - k - 1) * n;
-                add_scaled(factor, [&lh[j..], &ll[j..]], [&mut left_high[at + j..at + n], &mut left_low[at + j..at + n]]);
+                let inverse = dd::reciprocal(dd::square_root(pivot));
+                for i in k..n {
+                    let entry = dd::multiply(Double { h: high[i + k * n], l: low[i + k * n] }, inverse);
+                    (high[i + k * n], low[i + k * n]) = (entry.h, entry.l);
+                }
+                let (done_high, left_high) = high.split_at_mut((k + 1) * n);
+                let (done_low, left_low) = low.split_at_mut((k + 1) * n);
+                let (lh, ll) = (&done_high[k * n..], &done_low[k * n..]);
+                for j in k + 1..last {
+                    let factor = Double { h: -lh[j], l: -ll[j] };
+                    let to = (j - k - 1) * n + j..(j - k) * n;
+                    add_scaled(factor, [&lh[j..], &ll[j..]], [&mut left_high[to.clone()], &mut left_low[to]]);
+                }
+            }
+            let (done_high, left_high) = high.split_at_mut(last * n);
+            let (done_low, left_low) = low.split_at_mut(last * n);
+            for j in last..n {
+                // A whole panel: it is not the last one.
+                let column = |k: usize| (first + k) * n + j..(first + k + 1) * n;
+                let factors = std::array::from_fn(|k| {
+                    let at = column(k).start;
+                    Double { h: -done_high[at], l: -done_low[at] }
+                });
+                let columns = std::array::from_fn(|k| [&done_high[column(k)], &done_low[column(k)]]);
+                let to = (j - last) * n + j..(j - last + 1) * n;
+                add_several(factors, columns, [&mut left_high[to.clone()], &mut left_low[to]]);
             }
         }
         true
