@@ -240,7 +240,7 @@ impl Problem {
             }
         }
         match unproved {
-            true => Ok(self.solve_in_more_digits(options)?.filter(|again| again.outcome.is_optimal()).unwrap_or(answer)),
+            true => Ok(self.solve_in_more_digits(options)?.unwrap_or(answer)),
             false => Ok(answer),
         }
     }
@@ -251,7 +251,13 @@ impl Problem {
         let solved = balancing::solve_in_more_digits(program, &margins, options);
         let report = |(result, balancing)| {
             let translation = Translation { layout: &layout, unknowns: &self.unknowns, objective_constant, sign };
-            report(&Stated { problem: self, layout: &layout, margins: &margins }, &translation, result, balancing, options)
+            report(
+                &Stated { problem: self, layout: &layout, margins: &margins },
+                &translation,
+                result,
+                balancing,
+                options,
+            )
         };
         Ok(solved.map(report))
     }

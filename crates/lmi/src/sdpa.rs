@@ -110,11 +110,12 @@ impl Sdp {
         let layout = Layout::new(&unknowns);
         let margins = vec![0.0; self.blocks.len()];
         let translation = Translation { layout: &layout, unknowns: &unknowns, objective_constant: 0.0, sign: 1.0 };
-        let report = |(result, balancing)| report(&Stated { sdp: self, options }, &translation, result, balancing, options);
+        let report =
+            |(result, balancing)| report(&Stated { sdp: self, options }, &translation, result, balancing, options);
         let answer = report(balancing::solve(self.program(), &margins, options));
         if matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::NotVerified)) {
             let again = balancing::solve_in_more_digits(self.program(), &margins, options).map(report);
-            return Ok(again.filter(|again| again.outcome.is_optimal()).unwrap_or(answer));
+            return Ok(again.unwrap_or(answer));
         }
         Ok(answer)
     }

@@ -10,9 +10,10 @@ mod matrix;
 mod operator;
 
 use super::{
-    BACK_OFF, CENTRAL, Centre, Ending, INNER, MORE, Point, SOLVED_GAP, SOLVED_UNCERTAINTY, Solution, Status, nan_max, unattained,
+    BACK_OFF, CENTRAL, Centre, Ending, INNER, MORE, Point, SOLVED_GAP, SOLVED_UNCERTAINTY, Solution, Status, nan_max,
+    unattained,
 };
-use crate::answer::{IterationLog, Residuals};
+use crate::answer::{InaccurateReason, IterationLog, Residuals};
 use crate::block::Program;
 use crate::double_double::{self as dd, Double};
 use crate::{Mat, Options, start};
@@ -24,7 +25,14 @@ use std::time::Instant;
 /// Most multiplications for one iteration: a few tenths of a second.
 const MOST_WORK: f64 = 1e8;
 /// What is added to the unit diagonal of M where its factorisation does not exist: the least, the factor, the most.
-const REGULARIZATION: [f64; 3] = [1e-30, 1e3, 1e-14];
+const REGULARIZATION: [f64; 3] = [1e-31, 4.0, 1e-14];
+/// What S and Z of the starting point are multiplied by, one after the other: where the optimum is far larger than the data, steps from a small start get
+/// nowhere.
+const STARTS: [[f64; 2]; 2] = [[1.0, 1.0], [1e4, 1e8]];
+/// Rounds of refinement of one direction at most.
+const REFINEMENTS: usize = 10;
+/// What is missed after that, at best.
+const REFINED: f64 = 1e-10;
 /// Iterations without progress.
 const PATIENCE: usize = 15;
 /// A gap that falls by less than this factor in so many iterations is closed as far as need be, and not as far as asked for.
@@ -121,6 +129,21 @@ impl State {
         ds.add_multiple(one, residual);
     }
 
+    /// dS and dZ for a change of dx.
+    fn refine(&mut self, operator: &Operator, change: &Matrix, of_z: bool) {
+        let Self { n, z, s_inverse, ds, dz, work: [work, product], .. } = self;
+        let mut moved = Matrix::zeros(*n * *n);
+        operator.apply(change, &mut moved);
+        if of_z {
+            Self::triple(*n, z, &moved, z, work, product);
+            dz.add_multiple(Double { h: 1.0, l: 0.0 }, product);
+            return;
+        }
+        ds.add_multiple(Double { h: 1.0, l: 0.0 }, &moved);
+        Self::triple(*n, s_inverse, &moved, z, work, product);
+        dz.add_multiple(Double { h: -1.0, l: 0.0 }, product);
+    }
+
     /// The longest steps that keep S and Z semidefinite.
     fn longest_steps(&mut self) -> [f64; 2] {
         let Self { n, s_factor, z_factor, ds, dz, work: [work, product], .. } = self;
@@ -149,6 +172,11 @@ impl State {
     }
 }
 
+/// x ← s∘x for powers of two.
+fn scaled(x: &mut Matrix, scale: &[f64]) {
+    x.h.iter_mut().zip(&mut x.l).zip(scale).for_each(|((h, l), s)| (*h, *l) = (*h * s, *l * s));
+}
+
 fn smallest_eigenvalue(n: usize, m: &Matrix) -> f64 {
     if n == 1 {
         return m.h[0];
@@ -158,7 +186,7 @@ fn smallest_eigenvalue(n: usize, m: &Matrix) -> f64 {
 }
 
 struct Iteration<'a> {
-    operators: Vec<Operator>,
+    operators: &'a [Operator],
     states: Vec<State>,
     objective: &'a [f64],
     objective_norm: f64,
@@ -180,21 +208,67 @@ struct Iteration<'a> {
 }
 
 /// The solution of a program that the iteration in `f64` did not get far enough with; `None` where this one does not either, or would take too long.
-pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solution>, started: Instant) -> Option<Solution> {
+pub(crate) fn solve(
+    program: &Program,
+    options: &Options,
+    stopped: Option<&Solution>,
+    started: Instant,
+) -> Option<Solution> {
     let (operators, places) = operators(program);
     if !within_reach(program, &operators) {
         return None;
     }
     let centre = stopped.and_then(|stopped| stopped.sound.as_ref().or(stopped.centre.as_ref()));
-    let mut it = Iteration::new(program, operators, &places, centre);
-    let mut log: Vec<IterationLog> = Vec::new();
+    let starts = if centre.is_some() { &STARTS[..1] } else { &STARTS[..] };
+    let mut log = Vec::new();
+    let solve_from = |&factors: &[f64; 2]| {
+        let it = Iteration::new(program, &operators, &places, centre, factors);
+        iterate(it, &places, options, started, &mut log)
+    };
+    let Solved { ending, point, residuals, dual_objective, interior, inner } = starts.iter().find_map(solve_from)?;
+    let before = stopped.map_or(&[][..], |stopped| &stopped.log);
+    Some(Solution {
+        point,
+        ending,
+        residuals,
+        dual_objective,
+        interior,
+        inner,
+        centre: stopped.and_then(|stopped| stopped.centre.clone()),
+        sound: None,
+        units: program.scale.clone(),
+        log: before.iter().copied().chain(log).collect(),
+    })
+}
+
+/// A point that was solved before it was rounded to `f64`, and may be afterwards, with what is known of it.
+struct Solved {
+    ending: Ending,
+    point: Point,
+    residuals: Residuals,
+    dual_objective: f64,
+    interior: Option<Vec<f64>>,
+    inner: Option<Vec<Vec<f64>>>,
+}
+
+fn iterate(
+    mut it: Iteration<'_>,
+    places: &[Place],
+    options: &Options,
+    started: Instant,
+    log: &mut Vec<IterationLog>,
+) -> Option<Solved> {
+    let first = log.len();
     let mut sizes = Vec::new();
-    let (mut interior, mut inner) = (None, None);
+    let (mut interior, mut inner, mut best_point) = (None, None, None);
     let (mut best, mut since_progress, mut more) = ([f64::INFINITY; 3], 0, 0);
     loop {
         it.update_residuals();
         let status = it.status();
+        // Against what the equations are made of: the coefficients are about 1.
+        let against = (1.0 + it.objective_norm) / (1.0 + it.objective_norm + it.largest_multiplier());
         let Residuals { primal, dual, gap, uncertainty } = status.residuals;
+        let dual = dual * against;
         log.push(IterationLog {
             objective: status.objective,
             dual_objective: status.dual_objective,
@@ -209,7 +283,11 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
             interior = Some(it.x.h.clone());
         }
         if dual <= INNER * options.feasibility_tolerance && gap > BACK_OFF && gap <= CENTRAL {
-            inner = Some(it.multipliers(&places));
+            inner = Some(it.multipliers(places));
+        }
+        let merit = Status { residuals: Residuals { dual, ..status.residuals }, ..status }.merit(options);
+        if merit <= best[0].min(1.0) {
+            best_point = Some(it.copy());
         }
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
         let tolerance = options.feasibility_tolerance;
@@ -220,8 +298,7 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
             more += 1;
         }
         // Without an interior the gap closes slowly to the end.
-        let slow = log.len() > FEW && gap > SLOW * log[log.len() - 1 - FEW].residuals.gap;
-        let merit = status.merit(options);
+        let slow = sizes.len() > FEW && gap > SLOW * log[log.len() - 1 - FEW].residuals.gap;
         if slow && merit <= 0.5 && certain {
             break;
         }
@@ -232,35 +309,36 @@ pub(crate) fn solve(program: &Program, options: &Options, stopped: Option<&Solut
         best.iter_mut().zip(now).for_each(|(best, now)| *best = best.min(now));
         let cancelled = options.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
         let late = options.time_limit.is_some_and(|limit| started.elapsed() >= limit);
-        if cancelled || late || since_progress > PATIENCE || log.len() > options.max_iterations {
+        if cancelled || late {
             return None;
         }
-        let (centring, primal_step, dual_step) = it.step(&status)?;
+        let patience = if best[0] <= 1.0 { 1 } else { PATIENCE };
+        if since_progress > patience || sizes.len() > options.max_iterations {
+            break;
+        }
+        let Some((centring, primal_step, dual_step)) = it.step(&status) else { break };
         if let Some(entry) = log.last_mut() {
             (entry.centring, entry.primal_step, entry.dual_step) = (centring, primal_step, dual_step);
         }
     }
+    it.take(best_point?);
     // What is given away is rounded, and so are its residuals. By how much that misses the dual equations depends on the units of Z; what it is worth
     // against x says the uncertainty.
     it.round();
     it.update_residuals();
     let status = it.status();
     let worth = Status { residuals: Residuals { dual: 0.0, ..status.residuals }, ..status };
-    if worth.merit(options) > 1.0 || unattained(&log, &sizes, &Ending::Converged, options) {
+    if unattained(&log[first..], &sizes, &Ending::Converged, options) {
         return None;
     }
-    let before = stopped.map_or(&[][..], |stopped| &stopped.log);
-    Some(Solution {
-        point: Point { x: it.x.h.clone(), z: it.multipliers(&places) },
-        ending: Ending::Converged,
+    let solved = worth.merit(options) <= 1.0;
+    Some(Solved {
+        ending: if solved { Ending::Converged } else { Ending::Stopped(InaccurateReason::Stalled) },
+        point: Point { x: it.x.h.clone(), z: it.multipliers(places) },
         residuals: status.residuals,
         dual_objective: status.dual_objective,
         interior,
         inner,
-        centre: stopped.and_then(|stopped| stopped.centre.clone()),
-        sound: None,
-        units: program.scale.clone(),
-        log: before.iter().copied().chain(log).collect(),
     })
 }
 
@@ -275,7 +353,13 @@ fn within_reach(program: &Program, operators: &[Operator]) -> bool {
 }
 
 impl<'a> Iteration<'a> {
-    fn new(program: &'a Program, operators: Vec<Operator>, places: &[Place], centre: Option<&Centre>) -> Self {
+    fn new(
+        program: &'a Program,
+        operators: &'a [Operator],
+        places: &[Place],
+        centre: Option<&Centre>,
+        factors: [f64; 2],
+    ) -> Self {
         let unknowns = program.objective.len();
         let diagonals = match centre {
             Some(_) => Vec::new(),
@@ -290,9 +374,9 @@ impl<'a> Iteration<'a> {
                     Some(Centre { s, z, .. }) => [vec![s[block][row]], vec![z[block][row]]],
                     None => {
                         let (s, z) = &diagonals[block];
-                        [s, z].map(|d| {
+                        [(s, factors[0]), (z, factors[1])].map(|(d, factor)| {
                             let mut m = vec![0.0; n * n];
-                            (0..n).for_each(|i| m[i + i * n] = d[row + i]);
+                            (0..n).for_each(|i| m[i + i * n] = factor * d[row + i]);
                             m
                         })
                     }
@@ -322,7 +406,7 @@ impl<'a> Iteration<'a> {
     /// R = F(x) − S, closed as soon as F(x) is definite; c − A(Z).
     fn update_residuals(&mut self) {
         let minus = Double { h: -1.0, l: 0.0 };
-        for (state, operator) in self.states.iter_mut().zip(&self.operators) {
+        for (state, operator) in self.states.iter_mut().zip(self.operators) {
             state.residual.copy_from(&operator.constant);
             operator.apply(&self.x, &mut state.residual);
             state.residual.add_multiple(minus, &state.s);
@@ -344,9 +428,13 @@ impl<'a> Iteration<'a> {
         }
         self.misses.h.copy_from_slice(self.objective);
         self.misses.l.fill(0.0);
-        for (state, operator) in self.states.iter().zip(&self.operators) {
+        for (state, operator) in self.states.iter().zip(self.operators) {
             operator.adjoint(-1.0, &state.z, &mut self.misses);
         }
+    }
+
+    fn largest_multiplier(&self) -> f64 {
+        self.states.iter().flat_map(|state| &state.z.h).fold(0.0, |m, z| m.max(z.abs()))
     }
 
     fn primal_residual(&self) -> f64 {
@@ -372,8 +460,10 @@ impl<'a> Iteration<'a> {
     }
 
     fn step(&mut self, status: &Status) -> Option<(f64, f64, f64)> {
-        if !self.states.iter_mut().all(State::factorize) { return None; }
-        if !self.factorize() {
+        if !self.states.iter_mut().all(State::factorize) {
+            return None;
+        }
+        if !self.factorize(false) {
             return None;
         }
         self.direction(None);
@@ -383,6 +473,7 @@ impl<'a> Iteration<'a> {
         let exponent = (3.0 * primal.min(dual).powi(2)).max(1.0);
         let sigma = ratio.powf(exponent).clamp(1e-6, 1.0);
         self.direction(Some(sigma * status.mu));
+        self.refine(REFINED * (1.0 + self.objective_norm));
         let fraction = 0.9 + 0.098 * primal.min(dual);
         let [primal, dual] = self.longest_steps().map(|step| (fraction * step).min(1.0));
         let primal = self.safeguard(primal, false)?;
@@ -398,13 +489,13 @@ impl<'a> Iteration<'a> {
     }
 
     /// The Cholesky factor of M, scaled, in its place.
-    fn factorize(&mut self) -> bool {
+    fn factorize(&mut self, of_z: bool) -> bool {
         let n = self.objective.len();
         let m = &mut self.assembled;
         m.fill_zero();
-        for (state, operator) in self.states.iter_mut().zip(&self.operators) {
+        for (state, operator) in self.states.iter_mut().zip(self.operators) {
             let State { s_inverse, z, workspace, .. } = state;
-            operator.schur(s_inverse, z, n, m, workspace);
+            operator.schur(if of_z { &*z } else { &*s_inverse }, z, n, m, workspace);
         }
         for (i, scale) in self.scale.iter_mut().enumerate() {
             let entry = m.h[i + i * n];
@@ -453,18 +544,64 @@ impl<'a> Iteration<'a> {
         self.dx.h.copy_from_slice(self.objective);
         self.dx.l.fill(0.0);
         self.dx.h.iter_mut().for_each(|c| *c = -*c);
-        for (state, operator) in self.states.iter_mut().zip(&self.operators) {
+        for (state, operator) in self.states.iter_mut().zip(self.operators) {
             state.right_side(feasible, sigma_mu);
             operator.adjoint(1.0, &state.g, &mut self.dx);
         }
-        let scaled = |x: &mut Matrix, scale: &[f64]| {
-            x.h.iter_mut().zip(&mut x.l).zip(scale).for_each(|((h, l), s)| (*h, *l) = (*h * s, *l * s));
-        };
         scaled(&mut self.dx, &self.scale);
         matrix::solve(n, &self.m, &mut self.dx);
         scaled(&mut self.dx, &self.scale);
-        for (state, operator) in self.states.iter_mut().zip(&self.operators) {
+        for (state, operator) in self.states.iter_mut().zip(self.operators) {
             state.complete(operator, &self.dx);
+        }
+    }
+
+    /// What Z + dZ misses the dual equations by.
+    fn miss(&self, miss: &mut Matrix) -> f64 {
+        miss.h.copy_from_slice(self.objective);
+        miss.l.fill(0.0);
+        for (state, operator) in self.states.iter().zip(self.operators) {
+            operator.adjoint(-1.0, &state.z, miss);
+            operator.adjoint(-1.0, &state.dz, miss);
+        }
+        miss.h.iter().fold(0.0, |m: f64, v| nan_max(m, v.abs()))
+    }
+
+    /// Moves Z + dZ onto the dual equations A(Z + dZ) = c: by refinement of the direction, and where that does not get far, by Z F(y) Z.
+    fn refine(&mut self, enough: f64) {
+        let n = self.objective.len();
+        let (mut miss, mut change) = (Matrix::zeros(n), Matrix::zeros(n));
+        let mut last = f64::INFINITY;
+        for of_z in [false, true] {
+            if of_z && !self.factorize(true) {
+                return;
+            }
+            for _ in 0..REFINEMENTS {
+                let size = self.miss(&mut miss);
+
+                if size.is_nan() || size <= enough {
+                    return;
+                }
+                if size > 0.9 * last {
+                    break;
+                }
+                last = size;
+                // dZ − sym(P F(y) Z) meets them for My = A(Z + dZ) − c, with Z in place of P the other way round.
+                let sign = if of_z { 1.0 } else { -1.0 };
+                for at in 0..n {
+                    change.set(at, Double { h: sign * miss.h[at], l: sign * miss.l[at] });
+                }
+                scaled(&mut change, &self.scale);
+                matrix::solve(n, &self.m, &mut change);
+                scaled(&mut change, &self.scale);
+                if !of_z {
+                    self.dx.add_multiple(Double { h: 1.0, l: 0.0 }, &change);
+                }
+                for (state, operator) in self.states.iter_mut().zip(self.operators) {
+                    state.refine(operator, &change, of_z);
+                }
+            }
+            last = f64::INFINITY;
         }
     }
 
@@ -485,6 +622,16 @@ impl<'a> Iteration<'a> {
             step *= 0.8;
         }
         None
+    }
+
+    /// x and each S and Z.
+    fn copy(&self) -> (Matrix, Vec<[Matrix; 2]>) {
+        (self.x.clone(), self.states.iter().map(|state| [state.s.clone(), state.z.clone()]).collect())
+    }
+
+    fn take(&mut self, (x, blocks): (Matrix, Vec<[Matrix; 2]>)) {
+        self.x = x;
+        self.states.iter_mut().zip(blocks).for_each(|(state, [s, z])| (state.s, state.z) = (s, z));
     }
 
     /// x and Z to the precision of `f64`.

@@ -284,3 +284,62 @@ pub(super) fn add_column(n: usize, factor: Double, (a, from): (&Matrix, usize), 
     let (from, to) = (from * n..(from + 1) * n, to * n..(to + 1) * n);
     axpy(factor, [&a.h[from.clone()], &a.l[from]], [&mut b.h[to.clone()], &mut b.l[to]]);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vectorized::tests::with_every_instruction_set;
+
+    /// A positive definite matrix with entries that no `f64` holds.
+    fn definite(n: usize) -> Matrix {
+        let mut m = Matrix::zeros(n * n);
+        for j in 0..n {
+            for i in 0..n {
+                let h = if i == j { n as f64 + 1.0 } else { 1.0 / (1 + i + j) as f64 };
+                m.set(i + j * n, Double { h, l: h * 3e-17 });
+            }
+        }
+        m
+    }
+
+    fn largest_difference(a: &Matrix, b: &Matrix) -> f64 {
+        let difference = |at: usize| dd::add(a.get(at), Double { h: -b.h[at], l: -b.l[at] }).h.abs();
+        (0..a.h.len()).map(difference).fold(0.0, f64::max)
+    }
+
+    /// Sizes around the number of columns that are taken at once.
+    #[test]
+    fn factors_and_inverses() {
+        with_every_instruction_set(|| {
+            for n in [1, 2, 3, 4, 5, 8, 11] {
+                let m = definite(n);
+                let [mut factor, mut inverse, mut work, mut product, mut upper] =
+                    [(); 5].map(|()| Matrix::zeros(n * n));
+                factor.copy_from(&m);
+                assert!(cholesky(n, &mut factor));
+                multiply(n, &factor, &factor, &mut product);
+                assert!(largest_difference(&product, &m) < 1e-29, "{n}");
+                inverse_of_factor(n, &factor, &mut upper);
+                super::inverse(n, &upper, &mut work, &mut inverse);
+                multiply(n, &m, &inverse, &mut product);
+                let identity: Vec<f64> = (0..n * n).map(|at| f64::from(u8::from(at % n == at / n))).collect();
+                assert!(largest_difference(&product, &Matrix::of(&identity)) < 1e-29, "{n}");
+                let mut x = Matrix::of(&(0..n).map(|i| i as f64 - 1.5).collect::<Vec<_>>());
+                let right = x.clone();
+                solve(n, &factor, &mut x);
+                let row =
+                    |i: usize| Matrix { h: m.h[i * n..(i + 1) * n].to_vec(), l: m.l[i * n..(i + 1) * n].to_vec() };
+                for i in 0..n {
+                    let rest = dd::add(dot(&row(i), &x), Double { h: -right.h[i], l: 0.0 });
+                    assert!(rest.h.abs() < 1e-29, "{n}, {i}");
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn what_is_not_definite_has_no_factor() {
+        let mut m = Matrix::of(&[1.0, 1.0, 1.0, 1.0]);
+        assert!(!cholesky(2, &mut m));
+    }
+}
