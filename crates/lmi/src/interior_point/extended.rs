@@ -1,10 +1,11 @@
 //! The iteration in double-double arithmetic, for small problems that rounding errors stop.
 //!
 //! Close to an optimum where x is not unique, M has eigenvalues of size 1/μ and of size μ, and in `f64` the dual equations are lost
-//! before the gap is closed; where feasible points are far away or nearly none, before there is one. Here the same predictor-corrector steps are
-//! taken with twice the digits, from a point well inside that the other iteration came through or, without one, from its starting point. There is no
-//! detection of infeasible problems, no regularisation to speak of and no structure: entry by entry, everything dense. What comes out is rounded to `f64` and measured
-//! again.
+//! before the gap is closed; so they are where the multipliers have no interior, and where the optimum is far larger than the data there may not even be a feasible point. Here the
+//! same predictor-corrector steps are taken with twice the digits: from the last point of the other iteration that rounding had not touched, from one well inside that it came
+//! through, or from its starting point. Scaling by powers of two does not help against rounding: the steps would be the same to the bit.
+//!
+//! There is no detection of infeasible problems and no structure: entry by entry, everything dense. What comes out is rounded to `f64` and measured again.
 
 mod matrix;
 mod operator;
@@ -207,7 +208,8 @@ struct Iteration<'a> {
     feasible: bool,
 }
 
-/// The solution of a program that the iteration in `f64` did not get far enough with; `None` where this one does not either, or would take too long.
+/// The solution of a program that the iteration in `f64` did not get far enough with, if it did anything; `None` where this one does not either, or
+/// would take too long. Where the point is lost as it is rounded to `f64`, it is given as one that stalled.
 pub(crate) fn solve(
     program: &Program,
     options: &Options,
@@ -220,13 +222,14 @@ pub(crate) fn solve(
     }
     let centre = stopped.and_then(|stopped| stopped.sound.as_ref().or(stopped.centre.as_ref()));
     let starts = if centre.is_some() { &STARTS[..1] } else { &STARTS[..] };
+    let before = stopped.map_or(&[][..], |stopped| &stopped.log);
     let mut log = Vec::new();
     let solve_from = |&factors: &[f64; 2]| {
         let it = Iteration::new(program, &operators, &places, centre, factors);
-        iterate(it, &places, options, started, &mut log)
+        let most = options.max_iterations.saturating_sub(before.len() + log.len());
+        iterate(it, &places, most, options, started, &mut log)
     };
     let Solved { ending, point, residuals, dual_objective, interior, inner } = starts.iter().find_map(solve_from)?;
-    let before = stopped.map_or(&[][..], |stopped| &stopped.log);
     Some(Solution {
         point,
         ending,
@@ -254,6 +257,7 @@ struct Solved {
 fn iterate(
     mut it: Iteration<'_>,
     places: &[Place],
+    most: usize,
     options: &Options,
     started: Instant,
     log: &mut Vec<IterationLog>,
@@ -313,7 +317,7 @@ fn iterate(
             return None;
         }
         let patience = if best[0] <= 1.0 { 1 } else { PATIENCE };
-        if since_progress > patience || sizes.len() > options.max_iterations {
+        if since_progress > patience || sizes.len() > most {
             break;
         }
         let Some((centring, primal_step, dual_step)) = it.step(&status) else { break };
