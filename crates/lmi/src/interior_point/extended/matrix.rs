@@ -48,7 +48,7 @@ impl Matrix {
     pub fn symmetrize(&mut self, n: usize) {
         for j in 0..n {
             for i in 0..j {
-                let sum = dd::add(self.get(i + j * n), self.get(j + i * n));
+                let sum = dd::accumulate(self.get(i + j * n), self.get(j + i * n));
                 let half = Double { h: 0.5 * sum.h, l: 0.5 * sum.l };
                 self.set(i + j * n, half);
                 self.set(j + i * n, half);

@@ -3,6 +3,7 @@
 use super::matrix::{self, Matrix};
 use crate::block::Program;
 use crate::double_double::{self as dd, Double};
+use crate::vectorized::vectorized;
 
 /// The coefficient matrix of one unknown.
 #[derive(Debug)]
@@ -109,25 +110,12 @@ impl Operator {
 
     /// out ← out + Σ xᵢFᵢ.
     pub fn apply(&self, x: &Matrix, out: &mut Matrix) {
-        let n = self.n;
-        for c in &self.coefficients {
-            let x = x.get(c.unknown);
-            for &(i, j, value) in &c.entries {
-                let term = dd::multiply(value, x);
-                out.set(i + j * n, dd::accumulate(out.get(i + j * n), term));
-                if i != j {
-                    out.set(j + i * n, dd::accumulate(out.get(j + i * n), term));
-                }
-            }
-        }
+        apply(&self.coefficients, self.n, x, out);
     }
 
     /// outᵢ ← outᵢ + factor·⟨Fᵢ, H⟩ for symmetric H.
     pub fn adjoint(&self, factor: f64, h: &Matrix, out: &mut Matrix) {
-        for c in &self.coefficients {
-            let sum = inner(&c.entries, self.n, h);
-            out.set(c.unknown, dd::accumulate(out.get(c.unknown), dd::multiply_by(sum, factor)));
-        }
+        adjoint(&self.coefficients, self.n, factor, h, out);
     }
 
     /// Adds tr(FᵢPFⱼZ) to the lower triangle of the N × N matrix m.
@@ -141,22 +129,60 @@ impl Operator {
             }
             matrix::outer(n, p, &c.support, of_z, product);
             product.symmetrize(n);
-            for other in &self.coefficients[at..] {
-                let entry = inner(&other.entries, n, product);
-                let (i, j) = (c.unknown.max(other.unknown), c.unknown.min(other.unknown));
-                let place = i + j * unknowns;
-                m.set(place, dd::accumulate(m.get(place), entry));
+            add_row(&self.coefficients[at..], n, product, unknowns, m);
+        }
+    }
+}
+
+// Fused multiplications are instructions only where the instruction set is known.
+
+vectorized! {
+    fn apply<'a>(coefficients: &'a [Coefficient], n: usize, x: &'a Matrix, out: &'a mut Matrix) {
+        for c in coefficients {
+            let x = x.get(c.unknown);
+            for &(i, j, value) in &c.entries {
+                let term = dd::multiply(value, x);
+                out.set(i + j * n, dd::accumulate(out.get(i + j * n), term));
+                if i != j {
+                    out.set(j + i * n, dd::accumulate(out.get(j + i * n), term));
+                }
             }
         }
     }
 }
 
-/// ⟨F, H⟩ for symmetric H.
-fn inner(entries: &[(usize, usize, Double)], n: usize, h: &Matrix) -> Double {
-    let mut sum = Double::default();
-    for &(i, j, value) in entries {
-        let value = if i == j { value } else { Double { h: 2.0 * value.h, l: 2.0 * value.l } };
-        sum = dd::accumulate(sum, dd::multiply(value, h.get(i + j * n)));
+vectorized! {
+    fn adjoint<'a>(coefficients: &'a [Coefficient], n: usize, factor: f64, h: &'a Matrix, out: &'a mut Matrix) {
+        for c in coefficients {
+            let sum = inner(&c.entries, n, h);
+            out.set(c.unknown, dd::accumulate(out.get(c.unknown), dd::multiply_by(sum, factor)));
+        }
     }
-    sum
+}
+
+vectorized! {
+    /// Adds ⟨F, H⟩ for H of the first coefficient and each F to M.
+    fn add_row<'a>(coefficients: &'a [Coefficient], n: usize, h: &'a Matrix, unknowns: usize, m: &'a mut Matrix) {
+        let unknown = coefficients[0].unknown;
+        for other in coefficients {
+            let entry = inner(&other.entries, n, h);
+            let place = unknown.max(other.unknown) + unknown.min(other.unknown) * unknowns;
+            m.set(place, dd::accumulate(m.get(place), entry));
+        }
+    }
+}
+
+/// ⟨F, H⟩ for symmetric H. High and low parts are added up apart, so that no addition waits for more than the one before.
+#[inline(always)]
+fn inner(entries: &[(usize, usize, Double)], n: usize, h: &Matrix) -> Double {
+    let (mut high, mut low) = (0.0, 0.0);
+    for &(i, j, value) in entries {
+        let factor = if i == j { 1.0 } else { 2.0 };
+        let (a, b) = (Double { h: factor * value.h, l: factor * value.l }, h.get(i + j * n));
+        let product = dd::two_product(a.h, b.h);
+        let sum = dd::two_sum(high, product.h);
+        high = sum.h;
+        low += sum.l + a.l.mul_add(b.h, a.h.mul_add(b.l, product.l));
+    }
+    dd::fast_two_sum(high, low)
 }
