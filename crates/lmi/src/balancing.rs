@@ -112,7 +112,10 @@ fn carried_on(program: &Program, options: &Options, solution: Solution, started:
     if !matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled)) {
         return solution;
     }
-    interior_point::extended::solve(program, options, Some(&solution), started).unwrap_or(solution)
+    match interior_point::extended::solve(program, options, Some(&solution), started) {
+        Some(further) if closer(&further, &solution) => further,
+        _ => solution,
+    }
 }
 
 /// Whether the iteration gave up far from an answer.

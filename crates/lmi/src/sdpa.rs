@@ -134,7 +134,7 @@ impl Sdp {
         Ok(verify(&Stated { sdp: self, options: &options }, &[Mat::from_fn(x.len(), 1, |i, _| x[i])]).0)
     }
 
-    /// Explains an answer that is [`Outcome::Infeasible`](crate::Outcome::Infeasible); `None` for every other one, and where the least
+    /// Explains an answer that is [`Outcome::Infeasible`]; `None` for every other one, and where the least
     /// relaxation cannot be found. See [`Problem::explain`](crate::Problem::explain).
     ///
     /// # Errors

@@ -36,6 +36,8 @@ const REFINEMENTS: usize = 10;
 const REFINED: f64 = 1e-10;
 /// Iterations without progress.
 const PATIENCE: usize = 15;
+/// Merit of a point that is worth more than none.
+const WORTH: f64 = 1e2;
 /// A gap that falls by less than this factor in so many iterations is closed as far as need be, and not as far as asked for.
 const SLOW: f64 = 0.1;
 const FEW: usize = 3;
@@ -209,7 +211,7 @@ struct Iteration<'a> {
 }
 
 /// The solution of a program that the iteration in `f64` did not get far enough with, if it did anything; `None` where this one does not either, or
-/// would take too long. Where the point is lost as it is rounded to `f64`, it is given as one that stalled.
+/// would take too long. A point that is nearly solved, or no longer once it is rounded to `f64`, is given as one that stalled.
 pub(crate) fn solve(
     program: &Program,
     options: &Options,
@@ -244,7 +246,7 @@ pub(crate) fn solve(
     })
 }
 
-/// A point that was solved before it was rounded to `f64`, and may be afterwards, with what is known of it.
+/// A point, rounded to `f64`, that is solved or nearly so, with what is known of it.
 struct Solved {
     ending: Ending,
     point: Point,
@@ -290,9 +292,12 @@ fn iterate(
             inner = Some(it.multipliers(places));
         }
         let merit = Status { residuals: Residuals { dual, ..status.residuals }, ..status }.merit(options);
-        if merit <= best[0].min(1.0) {
+        if merit <= best[0].min(WORTH) {
             best_point = Some(it.copy());
         }
+        let progress_of = |best: f64, now: f64| now < 0.9 * best;
+        let improves = progress_of(best[0], merit);
+        best[0] = best[0].min(merit);
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
         let tolerance = options.feasibility_tolerance;
         if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance && certain {
@@ -307,10 +312,10 @@ fn iterate(
             break;
         }
         // Far from feasible, the gap grows for a while.
-        let now = [merit, primal.max(tolerance), dual.max(tolerance)];
-        let progress = now.iter().zip(&best).any(|(now, best)| *now < 0.9 * best);
+        let now = [primal.max(tolerance), dual.max(tolerance)];
+        let progress = improves || now.iter().zip(&best[1..]).any(|(now, best)| progress_of(*best, *now));
         since_progress = if progress { 0 } else { since_progress + 1 };
-        best.iter_mut().zip(now).for_each(|(best, now)| *best = best.min(now));
+        best[1..].iter_mut().zip(now).for_each(|(best, now)| *best = best.min(now));
         let cancelled = options.cancel.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
         let late = options.time_limit.is_some_and(|limit| started.elapsed() >= limit);
         if cancelled || late {
@@ -335,7 +340,7 @@ fn iterate(
     if unattained(&log[first..], &sizes, &Ending::Converged, options) {
         return None;
     }
-    let solved = worth.merit(options) <= 1.0;
+    let solved = best[0] <= 1.0 && worth.merit(options) <= 1.0;
     Some(Solved {
         ending: if solved { Ending::Converged } else { Ending::Stopped(InaccurateReason::Stalled) },
         point: Point { x: it.x.h.clone(), z: it.multipliers(places) },
