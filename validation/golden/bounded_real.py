@@ -36,9 +36,13 @@ def gain(a, b, c, w):
     n = a.nrows()
     shifted = acb_mat([[acb(0, w if i == j else 0) - a[i, j] for j in range(n)] for i in range(n)])
     g = acb_mat(c) * shifted.solve(acb_mat(b))
-    gram = g.conjugate().transpose() * g if hasattr(g, "conjugate") else adjoint(g) * g
-    gram = acb_mat([[acb(middle(gram[i, j].real), middle(gram[i, j].imag)) for j in range(gram.ncols())] for i in range(gram.nrows())])
-    return middle(max(float(0) + e.real.mid() for e in eigenvalues(gram))).sqrt() if gram.nrows() > 1 else middle(gram[0, 0].real).sqrt()
+    gram = adjoint(g) * g
+    size = gram.nrows()
+    if size == 1:
+        return middle(gram[0, 0].real).sqrt()
+    exact_gram = [[acb(middle(gram[i, j].real), middle(gram[i, j].imag)) for j in range(size)] for i in range(size)]
+    values = [middle(v.real) for v in eigenvalues(acb_mat(exact_gram))]
+    return max(values, key=lambda v: v.mid()).sqrt()
 
 
 def adjoint(g):
@@ -85,7 +89,8 @@ def main():
         b, c = ([[float(x) for x in row] for row in plant[key]] for key in "BC")
         value = norm(exact(a), exact(b), exact(c), arb(entry["hinf"]) * (1 - arb(10) ** -6))
         digits = value.str(17, radius=False)
-        text = json.dumps({"plant": entry["plant"], "norm": float(digits), "A": a, "B": b, "C": c}).replace(".0,", ",").replace(".0]", "]")
+        text = json.dumps({"plant": entry["plant"], "norm": float(digits), "A": a, "B": b, "C": c})
+        text = text.replace(".0,", ",").replace(".0]", "]")
         print(text + ("," if index + 1 < len(wanted) else ""), flush=True)
         print(entry["plant"], digits, float(digits) / entry["hinf"] - 1, file=sys.stderr, flush=True)
     print("]")
