@@ -186,3 +186,77 @@ fn inner(entries: &[(usize, usize, Double)], n: usize, h: &Matrix) -> Double {
     }
     dd::fast_two_sum(high, low)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assembly::Assembly;
+    use crate::block::{Block, DenseBlock, DiagonalBlock};
+    use crate::factored::Factored;
+    use crate::sparse::{Entry, Sparse};
+
+    /// Both kinds of blocks, with unknowns in units of their own, against the operators in `f64`.
+    #[test]
+    fn operators_are_those_of_the_program() {
+        let entry = |unknown, row, column, value| Entry { unknown, row, column, value };
+        let entries = [entry(0, 0, 0, 1.5), entry(0, 2, 1, -0.5), entry(1, 1, 0, 2.0), entry(2, 2, 2, 1.0)];
+        let dense = |entries: Vec<Entry>| {
+            let constant = vec![1.0, 0.5, 0.0, 0.5, 2.0, 0.0, 0.0, 0.0, 3.0];
+            Block::Dense(DenseBlock {
+                size: 3,
+                constant,
+                factored: Factored::default(),
+                sparse: Sparse::new(3, entries),
+            })
+        };
+        let diagonal = DiagonalBlock::new(vec![1.0, -1.0], vec![vec![(0, 2.0), (2, 1.0)], vec![(1, -3.0)]]);
+        let program = Program {
+            objective: vec![0.0; 3],
+            blocks: vec![dense(entries.to_vec()), Block::Diagonal(diagonal)],
+            scale: vec![1.0, 4.0, 0.5],
+            omega: 1.0,
+            balanced: false,
+            warm: None,
+        };
+        let (operators, places) = operators(&program);
+        assert_eq!(places.iter().map(|place| (place.first, place.count)).collect::<Vec<_>>(), [(0, 1), (1, 2)]);
+        let x = [0.7, -1.25, 2.0];
+        let unscaled: Vec<f64> = x.iter().zip(&program.scale).map(|(x, s)| x * s).collect();
+        let matrix = |n: usize, seed: usize| -> Vec<f64> {
+            let entry = |i: usize, j: usize| {
+                ((5 * i.max(j) + 3 * i.min(j) + seed) % 7) as f64 / 4.0 + f64::from(u8::from(i == j))
+            };
+            (0..n * n).map(|at| entry(at % n, at / n)).collect()
+        };
+        let mut assembly = Assembly::new(&program.blocks);
+        for (index, (block, place)) in program.blocks.iter().zip(&places).enumerate() {
+            let mut scratch = block.scratch(3);
+            let [p, z] =
+                [1, 2].map(|seed| if block.is_diagonal() { matrix(2, seed)[..2].to_vec() } else { matrix(3, seed) });
+            let mut value = block.constant().to_vec();
+            block.apply(&unscaled, &mut value, &mut scratch);
+            let mut adjoint = vec![0.0; 3];
+            block.adjoint(1.5, &z, &mut adjoint, &mut scratch);
+            let mut schur = vec![0.0; 9];
+            block.schur(index, [&p, &z], &mut assembly, &mut schur, 3, &mut scratch);
+            let (mut values, mut adjoints, mut m) = (Vec::new(), Matrix::zeros(3), Matrix::zeros(9));
+            for (row, operator) in operators[place.first..place.first + place.count].iter().enumerate() {
+                let part = |of: &[f64]| Matrix::of(if operator.n == 1 { &of[row..=row] } else { of });
+                let mut out = operator.constant.clone();
+                operator.apply(&Matrix::of(&x), &mut out);
+                values.extend(out.h);
+                operator.adjoint(1.5, &part(&z), &mut adjoints);
+                operator.schur(&part(&p), &part(&z), 3, &mut m, &mut operator.workspace());
+            }
+            assert!(values.iter().zip(&value).all(|(a, b)| (a - b).abs() < 1e-14), "{values:?} {value:?}");
+            for j in 0..3 {
+                let s = &program.scale;
+                assert!((adjoints.h[j] - s[j] * adjoint[j]).abs() < 1e-14, "{adjoints:?} {adjoint:?}");
+                for i in j..3 {
+                    let expected = s[i] * s[j] * schur[i + 3 * j];
+                    assert!((m.h[i + 3 * j] - expected).abs() < 1e-13, "{i} {j}: {} {expected}", m.h[i + 3 * j]);
+                }
+            }
+        }
+    }
+}
