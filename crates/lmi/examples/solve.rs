@@ -14,12 +14,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if flags.iter().any(|flag| flag == "--log") {
             for (k, i) in answer.iterations.iter().enumerate() {
                 println!(
-                    "{k:3} mu {:.2e} objective {:.10e} dual {:.10e} residuals {:.1e} {:.1e} sigma {:.1e} steps {:.4} {:.4}",
+                    "{k:3} mu {:.2e} objective {:.10e} dual {:.10e} residuals {:.1e} {:.1e} {:.1e} sigma {:.1e} steps {:.4} {:.4}",
                     i.complementarity,
                     i.objective,
                     i.dual_objective,
                     i.residuals.primal,
                     i.residuals.dual,
+                    i.residuals.uncertainty,
                     i.centring,
                     i.primal_step,
                     i.dual_step

@@ -11,6 +11,7 @@ use crate::answer::{Balancing, InaccurateReason, Residuals};
 use crate::block::Program;
 use crate::interior_point::{self, Ending, Solution};
 use std::borrow::Cow;
+use std::time::Instant;
 
 /// Rounds of conjugate gradients for the logarithms of the factors, which need no more than one digit.
 const ROUNDS: usize = 40;
@@ -64,7 +65,11 @@ pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) ->
         }
         solution
     };
-    let plain = (!wide).then(|| with_units(interior_point::solve(&program, options), &program));
+    let started = Instant::now();
+    let plain = (!wide).then(|| {
+        let solution = with_units(interior_point::solve(&program, options), &program);
+        if far_off(&solution, options) { solution } else { carried_on(&program, options, solution, started) }
+    });
     let plain = match plain {
         Some(solution) if !far_off(&solution, options) => return (solution, untouched),
         other => other,
@@ -83,6 +88,33 @@ pub(crate) fn solve(mut program: Program, margins: &[f64], options: &Options) ->
         (Some(plain), Some(balanced)) if closer(&balanced, &plain) => (balanced, Balancing { before, after }),
         (Some(plain), _) => (plain, untouched),
         (None, None) => (interior_point::solve(&program, options), untouched),
+    }
+}
+
+/// Solves a program, balanced, in more digits from the beginning: for what looked infeasible or unbounded and is not proved to be. `None` where that leads nowhere.
+pub(crate) fn solve_in_more_digits(
+    mut program: Program,
+    margins: &[f64],
+    options: &Options,
+) -> Option<(Solution, Balancing)> {
+    let equations = equations(&program);
+    let factors = factors(&program, &equations);
+    let balancing = Balancing { before: range(&equations), after: range_after(&equations, &factors) };
+    program.blocks.iter_mut().zip(margins).for_each(|(block, margin)| block.subtract(*margin));
+    program.warm = None;
+    let omega = apply(&mut program, &factors)?;
+    let solution = interior_point::extended::solve(&program, options, None, Instant::now())?;
+    Some((unscaled(&program, &factors, omega, solution), balancing))
+}
+
+/// The solution in more digits where rounding errors stopped the iteration; as it was where that does not help.
+fn carried_on(program: &Program, options: &Options, solution: Solution, started: Instant) -> Solution {
+    if !matches!(solution.ending, Ending::Stopped(InaccurateReason::Stalled)) {
+        return solution;
+    }
+    match interior_point::extended::solve(program, options, Some(&solution), started) {
+        Some(further) if closer(&further, &solution) => further,
+        _ => solution,
     }
 }
 
@@ -107,7 +139,14 @@ fn closer(a: &Solution, b: &Solution) -> bool {
 /// Scales the program, solves it, and gives the solution in the units of the program as it was; `None` where scaling overflows.
 fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> Option<Solution> {
     let omega = apply(program, factors)?;
-    let mut solution = interior_point::solve(program, options);
+    let started = Instant::now();
+    let solution = interior_point::solve(program, options);
+    let solution = carried_on(program, options, solution, started);
+    Some(unscaled(program, factors, omega, solution))
+}
+
+/// A solution of the scaled program in the units of the program as it was.
+fn unscaled(program: &Program, factors: &Factors, omega: f64, mut solution: Solution) -> Solution {
     let unscale = |x: &mut Vec<f64>| x.iter_mut().zip(&factors.unknowns).for_each(|(x, s)| *x *= s);
     unscale(&mut solution.point.x);
     solution.interior.iter_mut().for_each(unscale);
@@ -129,7 +168,7 @@ fn solve_scaled(program: &mut Program, factors: &Factors, options: &Options) -> 
         entry.objective /= omega;
         entry.dual_objective /= omega;
     }
-    Some(solution)
+    solution
 }
 
 /// Gives every entry of every block's matrix to `scaled` with its factor dᵢdⱼ.

@@ -15,14 +15,14 @@ pub(crate) struct Double {
 
 /// a + b exactly, for |a| ≥ |b| or a = 0.
 #[inline(always)]
-fn fast_two_sum(a: f64, b: f64) -> Double {
+pub(crate) fn fast_two_sum(a: f64, b: f64) -> Double {
     let h = a + b;
     Double { h, l: b - (h - a) }
 }
 
 /// a + b exactly.
 #[inline(always)]
-fn two_sum(a: f64, b: f64) -> Double {
+pub(crate) fn two_sum(a: f64, b: f64) -> Double {
     let h = a + b;
     let t = h - a;
     Double { h, l: (a - (h - t)) + (b - t) }
@@ -40,6 +40,13 @@ pub(crate) fn add(a: Double, b: Double) -> Double {
     let (s, t) = (two_sum(a.h, b.h), two_sum(a.l, b.l));
     let v = fast_two_sum(s.h, s.l + t.h);
     fast_two_sum(v.h, t.l + v.l)
+}
+
+/// a + b with an error of a few `UNIT`(|a| + |b|), in two thirds of the time: where a and b cancel, relative accuracy goes.
+#[inline(always)]
+pub(crate) fn accumulate(a: Double, b: Double) -> Double {
+    let s = two_sum(a.h, b.h);
+    fast_two_sum(s.h, s.l + (a.l + b.l))
 }
 
 #[inline(always)]

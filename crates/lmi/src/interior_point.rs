@@ -5,6 +5,7 @@
 //! or the unknowns by linear combinations, so that scaling matters for the starting point and the stopping rule only.
 
 mod certificate;
+pub(crate) mod extended;
 mod refinement;
 
 use crate::answer::{InaccurateReason, IterationLog, Residuals};
@@ -23,10 +24,18 @@ const BACK_OFF: f64 = 1e-6;
 /// Largest relative gap of a point that is called solved, and what the dual residual may take from it.
 pub(crate) const SOLVED_GAP: f64 = 1e-7;
 const SOLVED_UNCERTAINTY: f64 = 1e-6;
+/// An optimum smaller than this is to be told to [`SOLVED_GAP`] of itself, which so many more iterations may be spent on.
+const SMALL: f64 = 1e-2;
+const MORE: usize = 3;
 /// Dual residual of multipliers that are kept for proofs, against the tolerance.
 const INNER: f64 = 1e-2;
 /// Relative gap at which a point is kept for neighbouring problems to begin at.
 const CENTRAL: f64 = 3e-2;
+/// Iterations without progress, and those after which the iteration in more digits carries on if it can.
+const PATIENCE: usize = 15;
+const LITTLE_PATIENCE: usize = 4;
+/// Steps after which a point is well inside.
+const EVEN: f64 = 0.5;
 /// Where x still grows by this factor in each of so many last iterations, as the gap closes or until no progress is made, no x attains the
 /// optimum: close to one that is attained x hardly moves.
 const GROWTH: f64 = 1.1;
@@ -52,7 +61,7 @@ pub(crate) struct Point {
 }
 
 /// A point on the way, well inside: where the iteration of a neighbouring problem may begin.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Centre {
     pub x: Vec<f64>,
     pub s: Vec<Vec<f64>>,
@@ -94,6 +103,8 @@ pub(crate) struct Solution {
     pub inner: Option<Vec<Vec<f64>>>,
     /// Where a neighbouring problem may begin.
     pub centre: Option<Centre>,
+    /// The last point before rounding errors told, in the units of the program that was solved: where more digits may carry on.
+    pub sound: Option<Centre>,
     /// Sensible units of the unknowns.
     pub units: Vec<f64>,
     pub log: Vec<IterationLog>,
@@ -148,6 +159,12 @@ impl Status {
         let merit = nan_max(feasibility, nan_max(gap / SOLVED_GAP, uncertainty / SOLVED_UNCERTAINTY));
         if merit.is_nan() { f64::INFINITY } else { merit }
     }
+
+    /// Whether the gap is closed against the objectives themselves, where they are small against the unit.
+    fn resolves(&self, unit: f64) -> bool {
+        let size = self.objective.abs() + self.dual_objective.abs();
+        size >= SMALL * unit || self.residuals.gap * (unit + size) <= SOLVED_GAP * size
+    }
 }
 
 /// Solves a program in the solver's form.
@@ -180,11 +197,13 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let mut log: Vec<IterationLog> = Vec::new();
     let mut best: Option<(f64, Status)> = None;
     let mut point = Point::default();
-    let mut since_progress = 0;
+    let (mut since_progress, mut more) = (0, 0);
     let mut best_witness = f64::INFINITY;
     let mut interior = None;
     let mut inner = None;
     let mut centre = None;
+    let mut sound = None;
+    let mut even = false;
     // ‖x‖ of every iteration.
     let mut sizes: Vec<f64> = Vec::new();
     let ending = loop {
@@ -216,11 +235,17 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         if it.feasible && gap <= CENTRAL && centre.is_none() {
             centre = Some(it.centre());
         }
+        if it.feasible && even && gap <= CENTRAL && dual <= options.feasibility_tolerance && uncertainty <= gap {
+            it.copy_centre(sound.get_or_insert_default());
+        }
         sizes.push(norm(&it.x));
         let tolerance = options.feasibility_tolerance;
         let certain = uncertainty <= options.gap_tolerance * SOLVED_UNCERTAINTY / SOLVED_GAP;
         if primal <= tolerance && dual <= tolerance && gap <= options.gap_tolerance && certain {
-            break Ending::Converged;
+            if more == MORE || it.objective_norm == 0.0 || status.resolves(it.unit) {
+                break Ending::Converged;
+            }
+            more += 1;
         }
         let witness = it.witness_residual(&status);
         if witness <= CERTIFICATE || (witness <= NEAR_CERTIFICATE && it.complete_witness()) {
@@ -235,8 +260,9 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         }
         since_progress = if much || witness < 0.9 * best_witness { 0 } else { since_progress + 1 };
         best_witness = best_witness.min(witness);
-        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) { 1 } else { 15 };
-        if since_progress > patience {
+        let patience = if best.as_ref().is_some_and(|(merit, ..)| *merit <= 1.0) { 1 } else { PATIENCE };
+        let in_vain = since_progress == LITTLE_PATIENCE && sound.is_some() && extended::takes(program);
+        if since_progress > patience || in_vain {
             break Ending::Stopped(InaccurateReason::Stalled);
         }
         if let Some(reason) = it.interrupted(log.len(), started) {
@@ -244,6 +270,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
         }
         match it.step(&status) {
             Some((centring, primal_step, dual_step)) => {
+                even = primal_step.min(dual_step) >= EVEN;
                 if let Some(entry) = log.last_mut() {
                     (entry.centring, entry.primal_step, entry.dual_step) = (centring, primal_step, dual_step);
                 }
@@ -272,7 +299,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
     let status = best.map_or_else(|| it.status(), |(_, status)| status);
     let units = program.scale.clone();
     let Status { residuals, dual_objective, .. } = status;
-    Solution { point, ending, residuals, dual_objective, interior, inner, centre, units, log }
+    Solution { point, ending, residuals, dual_objective, interior, inner, centre, sound, units, log }
 }
 
 /// Whether the objective came closer to its bound only as x grew, from the norms of x in each iteration.
@@ -338,8 +365,16 @@ impl<'a> Iteration<'a> {
     }
 
     fn centre(&self) -> Centre {
-        let of = |part: fn(&BlockState) -> &Vec<f64>| self.blocks.iter().map(|b| part(b).clone()).collect();
-        Centre { x: self.x.clone(), s: of(|b| &b.s), z: of(|b| &b.z) }
+        let mut centre = Centre::default();
+        self.copy_centre(&mut centre);
+        centre
+    }
+
+    fn copy_centre(&self, to: &mut Centre) {
+        copy(&self.x, &mut to.x);
+        to.s.resize_with(self.blocks.len(), Vec::new);
+        to.s.iter_mut().zip(&self.blocks).for_each(|(to, block)| copy(&block.s, to));
+        self.copy_multipliers(&mut to.z);
     }
 
     fn copy_point(&self, to: &mut Point) {

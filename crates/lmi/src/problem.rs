@@ -3,7 +3,7 @@
 use crate::answer::{Answer, BlockReport, InaccurateReason, OptimumBound, Outcome, Tolerance};
 use crate::expression::{Expr, Unknown};
 use crate::interior_point::Centre;
-use crate::lowering::{Layout, lower};
+use crate::lowering::{Layout, Lowered, lower};
 use crate::multiplier::Multiplier;
 use crate::report::{Original, Translation, report, verify};
 use crate::rigorous::{Enclosure, Gradient, SumOfProducts};
@@ -244,7 +244,27 @@ impl Problem {
                 return Ok(again);
             }
         }
-        Ok(answer)
+        match unproved {
+            true => Ok(self.solve_in_more_digits(options)?.unwrap_or(answer)),
+            false => Ok(answer),
+        }
+    }
+
+    fn solve_in_more_digits(&self, options: &Options) -> Result<Option<Answer>, Error> {
+        let lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
+        let Lowered { program, layout, margins, objective_constant, sign } = lowered;
+        let solved = balancing::solve_in_more_digits(program, &margins, options);
+        let report = |(result, balancing)| {
+            let translation = Translation { layout: &layout, unknowns: &self.unknowns, objective_constant, sign };
+            report(
+                &Stated { problem: self, layout: &layout, margins: &margins },
+                &translation,
+                result,
+                balancing,
+                options,
+            )
+        };
+        Ok(solved.map(report))
     }
 
     fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {

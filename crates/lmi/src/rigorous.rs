@@ -12,7 +12,7 @@
 //! `diag(Σⱼ Eᵢⱼ)` exceeds any symmetric matrix with entries of at most Eᵢⱼ. The arithmetic is double-double (υ = 2⁻¹⁰⁰), so
 //! that matrices are proved definite whose smallest eigenvalue is far below the rounding errors of `f64`.
 //!
-//! Nothing here is shared with the solver.
+//! Nothing here is shared with the solver, except that both may compute in double-double.
 
 mod factor;
 

@@ -24,7 +24,7 @@ mod writer;
 pub use reader::{ReadError, read};
 pub use writer::write;
 
-use crate::answer::{Answer, BlockReport};
+use crate::answer::{Answer, BlockReport, InaccurateReason, Outcome};
 use crate::block::{Block, DenseBlock, DiagonalBlock, Program};
 use crate::explanation::explain;
 use crate::expression::Unknown;
@@ -108,9 +108,16 @@ impl Sdp {
         let m = self.objective.len();
         let unknowns = [Unknown { problem: u64::MAX, index: 0, rows: m, cols: 1, symmetric: false }];
         let layout = Layout::new(&unknowns);
-        let (result, balancing) = balancing::solve(self.program(), &vec![0.0; self.blocks.len()], options);
+        let margins = vec![0.0; self.blocks.len()];
         let translation = Translation { layout: &layout, unknowns: &unknowns, objective_constant: 0.0, sign: 1.0 };
-        Ok(report(&Stated { sdp: self, options }, &translation, result, balancing, options))
+        let report =
+            |(result, balancing)| report(&Stated { sdp: self, options }, &translation, result, balancing, options);
+        let answer = report(balancing::solve(self.program(), &margins, options));
+        if matches!(answer.outcome, Outcome::Inaccurate(InaccurateReason::NotVerified)) {
+            let again = balancing::solve_in_more_digits(self.program(), &margins, options).map(report);
+            return Ok(again.unwrap_or(answer));
+        }
+        Ok(answer)
     }
 
     /// Proves lower bounds on the smallest eigenvalues of the blocks at any x, whoever found it.
@@ -127,7 +134,7 @@ impl Sdp {
         Ok(verify(&Stated { sdp: self, options: &options }, &[Mat::from_fn(x.len(), 1, |i, _| x[i])]).0)
     }
 
-    /// Explains an answer that is [`Outcome::Infeasible`](crate::Outcome::Infeasible); `None` for every other one, and where the least
+    /// Explains an answer that is [`Outcome::Infeasible`]; `None` for every other one, and where the least
     /// relaxation cannot be found. See [`Problem::explain`](crate::Problem::explain).
     ///
     /// # Errors

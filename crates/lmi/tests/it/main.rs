@@ -1,5 +1,6 @@
 //! Integration tests, one binary.
 
+mod bounded_real;
 mod hostile;
 mod modelling;
 mod outcomes;

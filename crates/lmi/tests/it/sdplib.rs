@@ -58,6 +58,12 @@ fn graphs() {
     check("theta1", 23.00000, PUBLISHED);
 }
 
+/// Quadratic assignment, whose multipliers have no interior. Published is −3.8144 (in hundreds); seven digits from a run in 106 bits.
+#[test]
+fn assignment() {
+    check("qap6", -381.43840, 2e-7);
+}
+
 /// Problems without interior: the digits that are known, and no claim beyond them.
 #[test]
 fn ill_posed_control() {
