@@ -15,9 +15,11 @@ use std::collections::BTreeSet;
 const MOST_ROUNDS: usize = 40;
 /// Relative gap of the first rounds, and what it is multiplied by where nothing is broken.
 const FIRST_GAP: f64 = 1e-2;
-const NEXT_GAP: f64 = 1e-3;
-/// Of the largest trace of a multiplier: what carries less is taken back while the gap is wide.
+const NEXT_GAP: f64 = 1e-4;
+/// Of the largest trace of a multiplier: what carries less is taken back while the objective still moves.
 const IDLE: f64 = 2e-3;
+/// The same where the gap is small.
+const IDLE_AT_OPTIMUM: f64 = 1e-5;
 /// Of the worst violation: what is broken by less waits for the next round.
 const WORTH_POSING: f64 = 0.05;
 
@@ -36,11 +38,12 @@ impl Problem {
         self.inequalities.push(Inequality { name, expression, margin, lazy: Some(family) });
     }
 
-    /// The same problem, with the lazy inequalities that had to be posed for `answer` posed from the start.
+    /// The same problem, with the lazy inequalities that carry `answer` posed from the start.
     pub fn beginning_with(&self, answer: &Answer) -> Self {
         let mut problem = self.clone();
-        for (inequality, multiplier) in problem.inequalities.iter_mut().zip(&answer.multipliers) {
-            inequality.lazy = inequality.lazy.filter(|_| is_zero(multiplier));
+        let carries = carrying(&answer.multipliers, IDLE_AT_OPTIMUM);
+        for (inequality, carries) in problem.inequalities.iter_mut().zip(carries) {
+            inequality.lazy = inequality.lazy.filter(|_| !carries);
         }
         problem
     }
@@ -60,21 +63,32 @@ impl Problem {
             if round == MOST_ROUNDS || !posed.contains(&true) {
                 posed.fill(true);
             }
-            let mut answer = self.posing(&posed).solve(&Options { gap_tolerance: gap, ..options.clone() })?;
+            let relaxed = self.posing(&posed);
+            let mut answer = match gap > options.gap_tolerance {
+                // a point is enough, whatever the word for it
+                true => relaxed.solve_once(None, &Options { gap_tolerance: gap, ..options.clone() })?,
+                false => relaxed.solve(options)?,
+            };
             iterations.append(&mut answer.iterations);
             let has_point = answer.outcome.is_optimal() || matches!(answer.outcome, Outcome::Inaccurate(_));
             let broken = if has_point { self.broken(&posed, &answer, options) } else { Vec::new() };
+            let has_moved = has_moved(last, &answer, gap);
             let is_unbounded = matches!(answer.outcome, Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_));
             if is_unbounded && posed.contains(&false) {
                 posed.fill(true);
-            } else if has_point && gap > options.gap_tolerance && (broken.is_empty() || !has_moved(last, &answer, gap)) {
+            } else if has_point && gap > options.gap_tolerance && (broken.is_empty() || !has_moved) {
                 gap = options.gap_tolerance.max(NEXT_GAP * gap);
             } else if broken.is_empty() {
                 answer.iterations = iterations;
                 return Ok(self.completed(answer, &posed));
             }
-            if gap == FIRST_GAP && !broken.is_empty() {
-                self.drop_idle(&mut posed, &answer.multipliers);
+            // an objective that has become worse never comes back to what it was, so that nothing goes round in circles
+            if has_moved && !broken.is_empty() {
+                let carries = carrying(&answer.multipliers, if gap == FIRST_GAP { IDLE } else { IDLE_AT_OPTIMUM });
+                let mut carries = carries.into_iter();
+                for (posed, inequality) in posed.iter_mut().zip(&self.inequalities).filter(|(posed, _)| **posed) {
+                    *posed = carries.next().unwrap_or(true) || inequality.lazy.is_none();
+                }
             }
             broken.into_iter().for_each(|block| posed[block] = true);
             last = answer.objective;
@@ -84,10 +98,10 @@ impl Problem {
 
     /// The inequalities that are posed, alone and none of them lazy.
     fn posing(&self, posed: &[bool]) -> Self {
-        let mut problem = self.clone();
-        let mut posed = posed.iter();
-        problem.inequalities.retain(|_| posed.next() == Some(&true));
-        problem.inequalities.iter_mut().for_each(|inequality| inequality.lazy = None);
+        let mut problem = self.without_inequalities();
+        problem.objective.clone_from(&self.objective);
+        let stated = self.inequalities.iter().zip(posed).filter(|(_, posed)| **posed);
+        problem.inequalities = stated.map(|(inequality, _)| Inequality { lazy: None, ..inequality.clone() }).collect();
         problem
     }
 
@@ -114,17 +128,6 @@ impl Problem {
         broken.into_iter().take_while(is_worth).filter(leads).map(|(block, _)| block).collect()
     }
 
-    /// Takes back the lazy inequalities that carry next to nothing.
-    fn drop_idle(&self, posed: &mut [bool], multipliers: &[Mat<f64>]) {
-        let trace = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
-        let weights: Vec<f64> = multipliers.iter().map(trace).collect();
-        let least = IDLE * weights.iter().copied().fold(0.0, f64::max);
-        let mut weights = weights.into_iter();
-        for (posed, inequality) in posed.iter_mut().zip(&self.inequalities).filter(|(posed, _)| **posed) {
-            *posed = weights.next().is_none_or(|weight| weight > least) || inequality.lazy.is_none();
-        }
-    }
-
     /// The answer as one of the whole problem: blocks that were not posed are proved, and have a multiplier of zero.
     fn completed(&self, mut answer: Answer, posed: &[bool]) -> Answer {
         let nothing = |inequality: &Inequality| {
@@ -147,7 +150,11 @@ impl Problem {
         let mut own = std::mem::take(&mut answer.blocks).into_iter();
         // the values are the problem's own, so that their sizes fit
         let all = self.verify(&answer.values).unwrap_or_default();
-        answer.blocks = all.into_iter().zip(posed).map(|(block, posed)| posed.then(|| own.next()).flatten().unwrap_or(block)).collect();
+        answer.blocks = all
+            .into_iter()
+            .zip(posed)
+            .map(|(block, posed)| posed.then(|| own.next()).flatten().unwrap_or(block))
+            .collect();
         let waiting = answer.blocks.iter().zip(&self.inequalities).zip(posed).filter(|(_, posed)| !**posed);
         // by how much each may miss what it demands; a strict one has to be proved strict
         let missing = waiting.map(|((block, inequality), _)| {
@@ -178,6 +185,10 @@ fn has_moved(last: f64, answer: &Answer, gap: f64) -> bool {
     last.is_infinite() || (answer.objective - last).abs() > least
 }
 
-fn is_zero(matrix: &Mat<f64>) -> bool {
-    (0..matrix.ncols()).all(|j| matrix.col_as_slice(j).iter().all(|&entry| entry == 0.0))
+/// Which inequalities carry more than a share `least` of the largest.
+fn carrying(multipliers: &[Mat<f64>], least: f64) -> Vec<bool> {
+    let trace = |z: &Mat<f64>| (0..z.nrows()).map(|i| z[(i, i)]).sum::<f64>();
+    let weights: Vec<f64> = multipliers.iter().map(trace).collect();
+    let least = least * weights.iter().copied().fold(0.0, f64::max);
+    weights.into_iter().map(|weight| weight > least).collect()
 }

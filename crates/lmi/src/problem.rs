@@ -79,12 +79,22 @@ impl Problem {
 
     /// Demands `F ≻ 0`, posed as `F ⪰ margin·I` with the default margin of [`Options::margin`].
     pub fn positive_definite(&mut self, name: impl Into<String>, expression: impl Into<Expr>) {
-        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: None, lazy: None });
+        self.inequalities.push(Inequality {
+            name: name.into(),
+            expression: expression.into(),
+            margin: None,
+            lazy: None,
+        });
     }
 
     /// Demands `F ⪰ margin·I`.
     pub fn positive_definite_by(&mut self, name: impl Into<String>, expression: impl Into<Expr>, margin: f64) {
-        self.inequalities.push(Inequality { name: name.into(), expression: expression.into(), margin: Some(margin), lazy: None });
+        self.inequalities.push(Inequality {
+            name: name.into(),
+            expression: expression.into(),
+            margin: Some(margin),
+            lazy: None,
+        });
     }
 
     /// Sets the objective: the smallest value of a 1 × 1 expression.
@@ -267,7 +277,7 @@ impl Problem {
         Ok(solved.map(report))
     }
 
-    fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {
+    pub(crate) fn solve_once(&self, centre: Option<&Centre>, options: &Options) -> Result<Answer, Error> {
         let mut lowered = lower(self.id, &self.unknowns, &self.inequalities, self.objective.as_ref(), options)?;
         lowered.program.warm = centre.filter(|centre| centre.fits(&lowered.program)).cloned();
         let (result, balancing) = balancing::solve(lowered.program, &lowered.margins, options);

@@ -1,6 +1,7 @@
 //! Integration tests, one binary.
 
 mod bounded_real;
+mod generation;
 mod hostile;
 mod modelling;
 mod outcomes;

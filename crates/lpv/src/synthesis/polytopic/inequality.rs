@@ -104,7 +104,11 @@ impl<'a> DoubleSum<'a> {
     /// Whether a block, counted over the rates and the terms within each, is one that a solver should begin with: of a vertex itself, at the first or the
     /// last rate; all of them where there are few. The others may never matter.
     pub fn leads(&self, block: usize) -> bool {
-        let (terms, rates) = (self.terms().len(), self.rates().len());
+        let rates = match self.lyapunov {
+            Lyapunov::Common => 1,
+            Lyapunov::ParameterDependent { rate_vertices } => rate_vertices.len(),
+        };
+        let terms = self.terms().len();
         let (rate, term) = (block % (terms * rates) / terms, block % terms);
         terms * rates <= FEW_BLOCKS || term < self.polytope.len() && (rate == 0 || rate + 1 == rates)
     }

@@ -119,10 +119,12 @@ impl Stage<'_> {
             BackOff::Share(share) => vec![share],
             _ => self.ladder.to_vec(),
         };
+        // what carried one design carries the next
+        let mut begun = self.problem.beginning_with(&answer);
         // the largest share that the solver finds a design for, which rounding may keep it from
         let mut found = None;
         for (count, &share) in ladder.iter().enumerate().rev() {
-            if let Some(second) = self.second(&answer, share, options)? {
+            if let Some(second) = self.second(&answer, share, &mut begun, options)? {
                 found = Some((count, share, second));
                 break;
             }
@@ -138,7 +140,7 @@ impl Stage<'_> {
                 return Ok(moderated(0.0, answer));
             }
             for &share in &ladder[..smaller] {
-                let second = self.second(&answer, share, options)?;
+                let second = self.second(&answer, share, &mut begun, options)?;
                 if let Some(second) = second.filter(|second| self.effort(second, &most) <= enough) {
                     return Ok(moderated(share, second));
                 }
@@ -148,8 +150,14 @@ impl Stage<'_> {
     }
 
     /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it.
-    fn second(&self, first: &Answer, share: f64, options: &Options) -> Result<Option<Answer>, Error> {
-        let points = self.least_effort(first, share, options)?;
+    fn second(
+        &self,
+        first: &Answer,
+        share: f64,
+        begun: &mut Problem,
+        options: &Options,
+    ) -> Result<Option<Answer>, Error> {
+        let points = self.least_effort(first.objective, share, begun, options)?;
         let has_point = |point: &&Answer| {
             point.outcome.is_optimal() || matches!(point.outcome, Outcome::Inaccurate(_)) && point.objective.is_finite()
         };
@@ -170,12 +178,17 @@ impl Stage<'_> {
         point.unknown_values()[..count].iter().enumerate().map(scaled).collect()
     }
 
-    /// Points of least effort with the share `share` of the optimum of `first` given back, the better conditioned first, with the unknowns of the second
-    /// stage after those of the first.
-    fn least_effort(&self, first: &Answer, share: f64, options: &Options) -> Result<Vec<Answer>, Error> {
+    /// Points of least effort with the share `share` of `optimum` given back, the better conditioned first, with the unknowns of the second
+    /// stage after those of the first. `begun` is the first stage's problem, with the inequalities posed that the solver should begin with.
+    fn least_effort(
+        &self,
+        optimum: f64,
+        share: f64,
+        begun: &mut Problem,
+        options: &Options,
+    ) -> Result<Vec<Answer>, Error> {
         let one = |value: f64| Expr::constant(Mat::from_fn(1, 1, |_, _| value));
-        let optimum = first.objective;
-        let mut problem = self.problem.beginning_with(first);
+        let mut problem = begun.clone();
         let tau = problem.scalar("effort");
         let sign = self.objective.sign();
         // so that what is made strict still is within the share
@@ -190,6 +203,7 @@ impl Stage<'_> {
         problem.minimize(&tau);
         let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
         let least_effort = problem.solve(&options)?;
+        *begun = begun.beginning_with(&least_effort);
         let effort = least_effort.value(&tau)[(0, 0)];
         let large = |q: &&Mat<f64>| effort * self.condition(&least_effort, q) > LARGE_GAIN.powi(2);
         let Some(q) = self.q.filter(large) else { return Ok(vec![least_effort]) };
@@ -200,7 +214,8 @@ impl Stage<'_> {
             problem.positive_definite_by(format!("condition at vertex {}", i + 1), block, 0.0);
         }
         problem.minimize(&nu);
-        Ok(vec![problem.solve(&options)?, least_effort])
+        let conditioned = problem.beginning_with(&least_effort).solve(&options)?;
+        Ok(vec![conditioned, least_effort])
     }
 
     /// The least ν with P ⪯ νQ at every vertex, Q ≻ 0.
