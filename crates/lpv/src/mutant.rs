@@ -58,7 +58,7 @@ pub const TABLE: &[(&str, &str)] = &[
     ("box-cells-by-their-middle", "a cell of several parameters is proved by its middle alone"),
     ("box-cell-skipped", "the last cell of the box of several parameters is not looked at"),
     ("approximation-trusted", "of the LPV model what holds for its tensor-product model is claimed"),
-    ("range-unchecked", "states that are parameters may leave the parameters' ranges"),
+    ("range-unchecked", "states that are parameters may go twice as far as the parameters' ranges"),
     ("gain-lowered", "the L2 gain of the grid is claimed, a larger one proved"),
     ("gain-rate-dropped", "the L2 gain is that of a parameter that rests"),
     ("governor-row-skipped", "the last row of a governed reference's residual is not looked at"),

@@ -88,7 +88,8 @@ impl Transformed {
         }
         let Some(source) = &self.source else { return Ok(()) };
         let model = source.build().or_else(|error| door.refuse(format!("{key}.source"), error.to_string()))?;
-        let given: Vec<&str> = self.parameters.parameters.iter().map(|parameter| parameter.grid.name.as_str()).collect();
+        let given: Vec<&str> =
+            self.parameters.parameters.iter().map(|parameter| parameter.grid.name.as_str()).collect();
         let own: Vec<&str> = model.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
         match given == own {
             true => Ok(()),
@@ -197,7 +198,8 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
     if let Some(transformed) = &file.tensor_product {
         transformed.check(door, "tensor_product", count)?;
         if kind == Kind::Frozen {
-            return door.refuse("lyapunov", "is \"frozen\": a tensor-product model has vertices, and no designs at points");
+            return door
+                .refuse("lyapunov", "is \"frozen\": a tensor-product model has vertices, and no designs at points");
         }
         let built = transformed.source.as_ref().and_then(|source| source.build().ok());
         if let Some(model) = built.filter(|model| (model.states.len(), model.inputs) != (n, m)) {

@@ -44,7 +44,7 @@ pub(super) fn models(
         (Some(_), true) => door.refuse("model", "has matrices and a plant; keep one"),
         (None, false) => {
             door.refuse("model", "is empty: give the matrices A and B, plant = \"…\", or tensor_product = \"FILE\"")
-        },
+        }
         (Some(table), false) => plant_models(door, model, table),
         (None, true) => matrix_models(door, model, lyapunov),
     }

@@ -464,7 +464,8 @@ impl Report {
             return Worth::Everything;
         }
         let open = claims.iter().find(|claim| claim.verdict != Verdict::Proved);
-        let is_of_model = |claim: &&Claim| !matches!(claim.id.name, "weights" | "lyapunov-definite") && claim.of != Of::Polytope;
+        let is_of_model =
+            |claim: &&Claim| !matches!(claim.id.name, "weights" | "lyapunov-definite") && claim.of != Of::Polytope;
         let of_polytope = claims.iter().filter(|claim| plan.transformed.is_none() || !is_of_model(claim));
         if let Some(claim) = open.filter(|_| of_polytope.clone().all(|claim| claim.verdict == Verdict::Proved))
             && plan.transformed.is_some()

@@ -53,14 +53,16 @@ pub(super) fn tensor_product_models(door: &Door, name: &str) -> Result<Source, F
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
         Err(error) => {
-            let allowed = "it names a model file of lpv tp (TOML) or the JSON that lpv tp writes, from the folder of this file";
+            let allowed =
+                "it names a model file of lpv tp (TOML) or the JSON that lpv tp writes, from the folder of this file";
             return door.refuse(KEY, format!("is {name:?}: {} cannot be read ({error}); {allowed}", path.display()));
         }
     };
     let parts = if text.trim_start().starts_with('{') { written(&path, &text)? } else { made(&path, &text)? };
     let file = Door { file: &path };
     if parts.is_gain {
-        return file.refuse("weights", "make this the model of a regulator's gain K: a design needs [A B]; remove them");
+        return file
+            .refuse("weights", "make this the model of a regulator's gain K: a design needs [A B]; remove them");
     }
     let (n, width) = (parts.matrices[0].nrows(), parts.matrices[0].ncols());
     if width <= n {
@@ -72,8 +74,7 @@ pub(super) fn tensor_product_models(door: &Door, name: &str) -> Result<Source, F
         let of = |matrix: &Mat<f64>| Mat::from_fn(n, to - from, |i, j| matrix[(i, from + j)]);
         parts.matrices.iter().map(of).collect::<Vec<_>>()
     };
-    let polytope =
-        Polytope::new(part(0, n), part(n, width)).or_else(|error| door.refuse(KEY, error.to_string()))?;
+    let polytope = Polytope::new(part(0, n), part(n, width)).or_else(|error| door.refuse(KEY, error.to_string()))?;
     let schedule = &parts.transformed.parameters;
     let place = |vertex: usize| {
         let numbers: Vec<String> = schedule.numbers(vertex).iter().map(|number| (number + 1).to_string()).collect();
@@ -110,7 +111,8 @@ fn made(path: &Path, text: &str) -> Result<Parts, Failure> {
             return door.refuse("transformation.weights", message);
         }
     }
-    let model = TensorProductModel::of(&*plan.function, &plan.grids, &plan.options).map_err(|error| refusal(path, &error))?;
+    let model =
+        TensorProductModel::of(&*plan.function, &plan.grids, &plan.options).map_err(|error| refusal(path, &error))?;
     let transformed = Transformed { source: plan.lpv_model, parameters: model.schedule() };
     Ok(Parts { transformed, matrices: model.vertices(), is_gain: plan.is_gain })
 }
@@ -151,10 +153,14 @@ fn written(path: &Path, text: &str) -> Result<Parts, Failure> {
         let key = format!("vertices[{}]", at + 1);
         let numbers: Vec<usize> = parameters.numbers(at).iter().map(|number| number + 1).collect();
         if vertex.weights != numbers {
-            let message = format!("is of the weights {:?}: here come those of {numbers:?}, the last parameter first", vertex.weights);
+            let message = format!(
+                "is of the weights {:?}: here come those of {numbers:?}, the last parameter first",
+                vertex.weights
+            );
             return door.refuse(key, message);
         }
-        let is_sized = rows * columns > 0 && vertex.matrix.len() == rows && vertex.matrix.iter().all(|row| row.len() == columns);
+        let is_sized =
+            rows * columns > 0 && vertex.matrix.len() == rows && vertex.matrix.iter().all(|row| row.len() == columns);
         if !is_sized {
             return door.refuse(key, format!("has to be a {rows} × {columns} matrix, as size says"));
         }
@@ -177,9 +183,11 @@ pub(super) fn check_initial(
     let Some(model) = transformed.source.as_ref().and_then(|source| source.build().ok()) else { return Ok(()) };
     let pairs = || model.parameters.iter().zip(&transformed.parameters.parameters);
     if given.is_some() && model.parameters.iter().any(|parameter| parameter.state.is_some()) {
-        let names: Vec<&str> =
-            model.parameters.iter().filter(|p| p.state.is_some()).map(|p| p.name.as_str()).collect();
-        let message = format!("is given for a model whose parameters are states ({}): initial_state says where they start; remove it", names.join(", "));
+        let names: Vec<&str> = model.parameters.iter().filter(|p| p.state.is_some()).map(|p| p.name.as_str()).collect();
+        let message = format!(
+            "is given for a model whose parameters are states ({}): initial_state says where they start; remove it",
+            names.join(", ")
+        );
         return door.refuse("design.initial_parameter", message);
     }
     for (parameter, ScheduledParameter { grid, .. }) in pairs() {

@@ -9,9 +9,9 @@ use crate::scenario::weights::definite;
 use lpv::math::Mat;
 use lpv::math::matrix::from_rows;
 use lpv::math::riccati;
-use lpv::model::{ModelSource, linearize};
 use lpv::model::literature::LiteratureModel;
 use lpv::model::tensor_product::{ParameterGrid, RankRule, TensorProductOptions, Weighting};
+use lpv::model::{ModelSource, linearize};
 use std::path::Path;
 
 /// Numbers that the samples may hold: 400 MB.

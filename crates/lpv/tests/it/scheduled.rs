@@ -13,9 +13,7 @@ use lpv::model::tensor_product::{
 };
 use lpv::model::{ModelSource, Polytope};
 use lpv::synthesis::CostWeights;
-use lpv::synthesis::polytopic::{
-    BackOff, HighGain, InputBounds, Lyapunov, Objective, PolytopicRequest, synthesize,
-};
+use lpv::synthesis::polytopic::{BackOff, HighGain, InputBounds, Lyapunov, Objective, PolytopicRequest, synthesize};
 
 /// A design with all that is claimed of it.
 struct Case {
@@ -71,10 +69,9 @@ impl Asked {
             weights: Some(weights.clone()),
             lyapunov: Lyapunov::Common,
             saturation: self.saturation.clone(),
-            high_gain: self.high_gain.then_some(HighGain {
-                options: lpv::synthesis::HighGainOptions::default(),
-                sample_time_s: Some(0.01),
-            }),
+            high_gain: self
+                .high_gain
+                .then_some(HighGain { options: lpv::synthesis::HighGainOptions::default(), sample_time_s: Some(0.01) }),
             objective: Objective::Trace,
             back_off: BackOff::Share(0.05),
         };
@@ -173,8 +170,14 @@ fn tora_is_proved_for_the_model_and_for_the_plant() {
     }
     let ids: Vec<String> = claims.iter().map(|claim| claim.id.to_string()).collect();
     for id in [
-        "polytope.decrease", "polytope.cost", "transformation-error", "decrease", "cost", "states-in-range",
-        "plant.invariance", "plant.cost",
+        "polytope.decrease",
+        "polytope.cost",
+        "transformation-error",
+        "decrease",
+        "cost",
+        "states-in-range",
+        "plant.invariance",
+        "plant.cost",
     ] {
         assert!(ids.iter().any(|other| other == id), "{id} is missing in {ids:?}");
     }
@@ -298,11 +301,7 @@ fn the_edge_of_the_box_counts() {
         let points = &mut parameters[1].grid.points;
         let last = points.len() - 1;
         (points[0], points[last]) = (-share, share);
-        Case {
-            source: case.source.clone(),
-            schedule: TensorProductSchedule { parameters },
-            claim: case.claim.clone(),
-        }
+        Case { source: case.source.clone(), schedule: TensorProductSchedule { parameters }, claim: case.claim.clone() }
     };
     let is_proved = |half: f64| verdict(&stretched(half).prove_with(40_000), "decrease") == Verdict::Proved;
     let truth = |half: f64| stretched(half).sampled([1.0, 0.0], 41);

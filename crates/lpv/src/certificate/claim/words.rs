@@ -50,7 +50,11 @@ impl ClaimKind {
                 at_most(*b)
             ),
             Self::StatesInRange { level, states } => {
-                format!("on {v} <= {} the states stay in the ranges of their parameters: {}", at_least(*level), states.join(", "))
+                format!(
+                    "on {v} <= {} the states stay in the ranges of their parameters: {}",
+                    at_least(*level),
+                    states.join(", ")
+                )
             }
             Self::SampledStability { sample_time_s } => {
                 format!("the loop sampled with zero-order hold is stable at T = {sample_time_s} s{fixed}")

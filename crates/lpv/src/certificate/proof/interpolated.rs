@@ -37,7 +37,10 @@ impl<'a> Scheduled<'a> {
             let with = |point: &Vec<Interval>, row: &Vec<f64>| {
                 point.iter().flat_map(|&weight| row.iter().map(move |&own| weight * own)).collect::<Vec<_>>()
             };
-            points.iter().flat_map(|point| parameter.weights.iter().map(|row| with(point, row)).collect::<Vec<_>>()).collect()
+            points
+                .iter()
+                .flat_map(|point| parameter.weights.iter().map(|row| with(point, row)).collect::<Vec<_>>())
+                .collect()
         });
         let value = |weights: &Vec<Interval>| {
             let terms = entries.iter().map(Vec::as_slice).zip(weights.iter().copied());

@@ -56,7 +56,8 @@ impl BoxCell {
 
     /// Of each parameter the largest |ρₖ − cₖ|.
     pub fn halves(&self) -> Vec<f64> {
-        self.ends.iter().map(|&[low, high]| Interval::new(low, high).middle_and_radius().1).collect()
+        let share = if mutant::is("box-cells-by-their-middle") { 0.0 } else { 1.0 };
+        self.ends.iter().map(|&[low, high]| share * Interval::new(low, high).middle_and_radius().1).collect()
     }
 
     /// Its corners, as cells of no width.
@@ -144,9 +145,8 @@ impl MeanValueMatrix {
         let factor: Vec<f64> = (0..n * n).map(|at| inverse[(at / n, at % n)]).collect();
         let constant = self.middle.row_sums_of_congruence(&factor, 1.0);
         let linear: Vec<Vec<f64>> = self.slopes.iter().map(|s| s.row_sums_of_congruence(&factor, 0.0)).collect();
-        let halves = |k: usize| if mutant::is("box-cells-by-their-middle") { 0.0 } else { halves[k] };
         let excess = |i: usize| {
-            let rows = (0..linear.len()).map(|k| Interval::point(halves(k)) * linear[k][i]);
+            let rows = (0..linear.len()).map(|k| Interval::point(halves[k]) * linear[k][i]);
             rows.fold(Interval::point(constant[i]), |sum, row| sum + row).hi()
         };
         let rows: Vec<f64> = (0..n).map(excess).collect();
@@ -155,7 +155,7 @@ impl MeanValueMatrix {
             let largest = rows.into_iter().fold(0.0, f64::max);
             return Judged::Proved((1.0 - largest).next_down());
         }
-        let taken = |k: usize| halves(k) * linear[k].iter().copied().fold(0.0, f64::max);
+        let taken = |k: usize| halves[k] * linear[k].iter().copied().fold(0.0, f64::max);
         let widest = (0..linear.len()).max_by(|&j, &k| taken(j).total_cmp(&taken(k))).unwrap_or(0);
         Judged::Open(widest)
     }

@@ -17,8 +17,8 @@
 //! on {V ≤ c} they are, if |xᵢ| ≤ rᵢ there for the nearer end rᵢ of each, [1/c, eᵢ/rᵢ; ·ᵀ, P] ≻ 0. What is claimed of the model then holds of
 //! the plant from every state of that set.
 
-use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use super::interpolated::Scheduled;
+use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
 use super::mean_value::{BoxCell, BoxOutcome, MeanValueMatrix, prove_on_box};
 use super::polytopic::{PolytopicClaim, PolytopicLyapunov};
 use super::rowwise::{Balanced, Rows, mixed, multipliers, separable, shares};
@@ -287,10 +287,10 @@ impl<'a> BoxLoop<'a> {
         let motion = Motion::WithinRanges;
         let (kind, mut premises) = match (cost, level) {
             (None, None) => (ClaimKind::Decrease { motion }, vec!["lyapunov-definite"]),
-            (None, Some(level)) => {
-                (ClaimKind::Invariance { level, motion }, vec!["lyapunov-definite", "unsaturated"])
+            (None, Some(level)) => (ClaimKind::Invariance { level, motion }, vec!["lyapunov-definite", "unsaturated"]),
+            (Some((factor, _)), None) => {
+                (ClaimKind::Cost { factor, level, motion }, vec!["lyapunov-definite", "weights"])
             }
-            (Some((factor, _)), None) => (ClaimKind::Cost { factor, level, motion }, vec!["lyapunov-definite", "weights"]),
             (Some((factor, _)), Some(_)) => {
                 let kind = ClaimKind::Cost { factor, level, motion };
                 (kind, vec!["lyapunov-definite", "weights", "unsaturated"])
@@ -350,16 +350,16 @@ impl<'a> BoxLoop<'a> {
     /// The inputs whose rows of K and F differ at some vertex: of the others saturation takes nothing.
     fn moving(&self, saturating: &[usize]) -> Vec<bool> {
         let Some(f) = &self.claim.auxiliary_gain else { return vec![false; saturating.len()] };
-        let differs = |i: usize| self.gains().iter().zip(f).any(|(k, f)| (0..k.ncols()).any(|j| k[(i, j)] != f[(i, j)]));
+        let differs =
+            |i: usize| self.gains().iter().zip(f).any(|(k, f)| (0..k.ncols()).any(|j| k[(i, j)] != f[(i, j)]));
         saturating.iter().map(|&i| differs(i) && !mutant::is("saturation-is-free")).collect()
     }
 
     /// The transformation's error: Σ wᵥAᵥ − A and Σ wᵥBᵥ − B on cells that cover the box. Those on which it may be largest are bisected.
     fn error(&self) -> Claim {
         let started = Instant::now();
-        let bounded = |cells: Vec<BoxCell>| -> Vec<ErrorCell> {
-            cells.into_par_iter().map(|cell| self.error_on(cell)).collect()
-        };
+        let bounded =
+            |cells: Vec<BoxCell>| -> Vec<ErrorCell> { cells.into_par_iter().map(|cell| self.error_on(cell)).collect() };
         let mut cells = bounded(self.cells());
         let mut looked_at = cells.len();
         loop {
@@ -379,7 +379,9 @@ impl<'a> BoxLoop<'a> {
         let claim = Claim::new(ClaimKind::TransformationError { a, b }, Of::Model, &self.words);
         let claim = match a.is_finite() && b.is_finite() {
             true => claim.decided(Verdict::Proved, 0.0, format!("{} cells", cells.len())),
-            false => claim.decided(Verdict::Undecided, f64::NAN, "the model is not bounded in the ranges of its parameters"),
+            false => {
+                claim.decided(Verdict::Undecided, f64::NAN, "the model is not bounded in the ranges of its parameters")
+            }
         };
         Claim { cells: cells.len(), seconds: started.elapsed().as_secs_f64(), ..claim }
     }
@@ -413,11 +415,13 @@ impl<'a> BoxLoop<'a> {
 
     /// The claims about the nonlinear plant, from what is proved of the model.
     fn of_plant(&self, model: &[Claim], level: Option<f64>) -> Vec<Claim> {
+        // a defect, where it is asked for
+        let reach = if mutant::is("range-unchecked") { 2.0 } else { 1.0 };
         let states: Vec<(usize, f64)> = (self.source.parameters.iter().zip(&self.schedule.parameters))
             .filter_map(|(source, parameter)| {
                 let points = &parameter.grid.points;
                 // how far the state may go to either side of rest
-                Some((source.state?, (-points[0]).min(points[points.len() - 1])))
+                Some((source.state?, reach * (-points[0]).min(points[points.len() - 1])))
             })
             .collect();
         if states.is_empty() {
@@ -429,12 +433,11 @@ impl<'a> BoxLoop<'a> {
             states.iter().zip(&names).filter(|((_, r), _)| *r <= 0.0).map(|(_, name)| name.clone()).collect();
         let kind = |level: f64| ClaimKind::StatesInRange { level, states: names.clone() };
         let in_range = |level: f64| {
-            mutant::is("range-unchecked")
-                || states.iter().all(|&(i, r)| {
-                    let one = Taylor::constant(Interval::point(1.0) / r);
-                    let matrix = self.bordered(level, |j| if i == j { one } else { Taylor::from(0.0) });
-                    matches!(CellMatrix::new(&matrix, &matrix).is_positive(0.0), Definiteness::Proved(_))
-                })
+            states.iter().all(|&(i, r)| {
+                let one = Taylor::constant(Interval::point(1.0) / r);
+                let matrix = self.bordered(level, |j| if i == j { one } else { Taylor::from(0.0) });
+                matches!(CellMatrix::new(&matrix, &matrix).is_positive(0.0), Definiteness::Proved(_))
+            })
         };
         let widest = inverse_spd(&witness::middle(&self.p))
             .map(|y| states.iter().map(|&(i, r)| r * r / y[(i, i)]).fold(f64::INFINITY, f64::min))
@@ -454,7 +457,8 @@ impl<'a> BoxLoop<'a> {
         };
         let radii: Vec<String> =
             states.iter().zip(&names).map(|(&(_, r), name)| format!("|{name}| <= {}", at_least(r))).collect();
-        let stays = claim(kind(within)).decided(Verdict::Proved, 0.0, radii.join(", ")).resting_on(&["lyapunov-definite"]);
+        let stays =
+            claim(kind(within)).decided(Verdict::Proved, 0.0, radii.join(", ")).resting_on(&["lyapunov-definite"]);
         let stays = Claim { seconds: started.elapsed().as_secs_f64(), ..stays };
         // what still moves from outside
         let free = words(self.schedule, |k| self.source.parameters[k].state.is_none());
@@ -463,9 +467,7 @@ impl<'a> BoxLoop<'a> {
             let (kind, premises): (ClaimKind, &[&'static str]) = match claim.kind {
                 ClaimKind::Decrease { .. } => (ClaimKind::Invariance { level: within, motion }, &["decrease"]),
                 ClaimKind::Invariance { .. } => (ClaimKind::Invariance { level: within, motion }, &["invariance"]),
-                ClaimKind::Cost { factor, .. } => {
-                    (ClaimKind::Cost { factor, level: Some(within), motion }, &["cost"])
-                }
+                ClaimKind::Cost { factor, .. } => (ClaimKind::Cost { factor, level: Some(within), motion }, &["cost"]),
                 _ => return None,
             };
             let detail = "A(x)x + B(x)u is the plant on the set".to_string();

@@ -50,7 +50,9 @@ pub enum ScheduleError {
         points: usize,
     },
     /// A weight below zero, or that is no number, or weights with another sum.
-    #[error("the weights of {parameter} at grid point {point} are not convex: each has to be zero or more, and their sum one")]
+    #[error(
+        "the weights of {parameter} at grid point {point} are not convex: each has to be zero or more, and their sum one"
+    )]
     NotConvex {
         /// Of which parameter.
         parameter: String,

@@ -68,7 +68,8 @@ fn generate(numbers: &mut Numbers) -> Option<Case> {
     };
     // vertices are the values at the corners, some of them wrong
     let is_wrong = numbers.once_in(4);
-    let corners: Vec<Vec<f64>> = (0..4).map(|v| schedule.numbers(v)).map(|n| vec![ends(0, n[0]), ends(1, n[1])]).collect();
+    let corners: Vec<Vec<f64>> =
+        (0..4).map(|v| schedule.numbers(v)).map(|n| vec![ends(0, n[0]), ends(1, n[1])]).collect();
     let vertices: Vec<(Mat<f64>, Mat<f64>)> = corners
         .iter()
         .map(|rho| {
