@@ -403,7 +403,7 @@ impl Case {
             let now = quadratic_form(self.p(), &x);
             assert!(now <= v * (1.0 + 1e-9) + 1e-15, "V grows from {v} to {now} at {x:?}");
             v = now;
-            assert!(x[2].abs() <= 0.7854 && x[3].abs() <= 0.5 + 1e-9, "{x:?}");
+            assert!(x[2].abs() <= std::f64::consts::FRAC_PI_4 + 1e-9 && x[3].abs() <= 0.5 + 1e-9, "{x:?}");
         }
         // the trapezoidal rule is right to 10⁻⁴ here
         assert!(start <= level * (1.0 + 1e-9) && cost <= factor * start * (1.0 + 1e-3), "{cost} of {start}");

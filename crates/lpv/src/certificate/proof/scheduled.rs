@@ -111,6 +111,8 @@ struct BoxLoop<'a> {
     claim: &'a PolytopicClaim,
     schedule: &'a TensorProductSchedule,
     source: SourceModel,
+    /// What the model is called.
+    name: String,
     /// P
     p: TaylorMatrix,
     /// K(ρ), and F(ρ) of a high gain.
@@ -143,6 +145,7 @@ impl<'a> BoxLoop<'a> {
     fn new(claim: &ScheduledClaim<'a>) -> Result<Self, String> {
         let ScheduledClaim { polytopic, schedule, source, most_cells } = *claim;
         let source = source.ok_or("the model is known by its samples alone, and nothing is known between them")?;
+        let name = source.name();
         let source = source.build().map_err(|error| format!("the model cannot be evaluated: {error}"))?;
         let PolytopicLyapunov::Common { p, gain } = &polytopic.lyapunov else {
             return Err("V depends on the weights of the vertices: only a common P is proved for the LPV model".into());
@@ -163,6 +166,7 @@ impl<'a> BoxLoop<'a> {
             claim: polytopic,
             schedule,
             source,
+            name,
             p: TaylorMatrix::constant(p),
             gain: scheduled(gain),
             auxiliary: polytopic.auxiliary_gain.as_deref().map(scheduled),
@@ -378,7 +382,7 @@ impl<'a> BoxLoop<'a> {
         let [a, b] = [0, 1].map(|k| cells.iter().map(|cell| cell.bound[k]).fold(0.0, greater));
         let claim = Claim::new(ClaimKind::TransformationError { a, b }, Of::Model, &self.words);
         let claim = match a.is_finite() && b.is_finite() {
-            true => claim.decided(Verdict::Proved, 0.0, format!("{} cells", cells.len())),
+            true => claim.decided(Verdict::Proved, 0.0, format!("{}, {} cells", self.name, cells.len())),
             false => {
                 claim.decided(Verdict::Undecided, f64::NAN, "the model is not bounded in the ranges of its parameters")
             }
@@ -470,7 +474,7 @@ impl<'a> BoxLoop<'a> {
                 ClaimKind::Cost { factor, .. } => (ClaimKind::Cost { factor, level: Some(within), motion }, &["cost"]),
                 _ => return None,
             };
-            let detail = "A(x)x + B(x)u is the plant on the set".to_string();
+            let detail = format!("{}, A(x)x + B(x)u is the plant on the set", self.name);
             let claim = Claim::new(kind, Of::Plant, &free).decided(Verdict::Proved, claim.margin, detail);
             Some(claim.resting_on(&["states-in-range"]).resting_on(premises))
         };
@@ -484,9 +488,11 @@ impl<'a> BoxLoop<'a> {
             named.map(|(p, value)| format!("{} = {}", p.grid.name, about(*value))).collect::<Vec<_>>().join(", ")
         };
         let claim = match outcome {
-            BoxOutcome::Proved(margin) => {
-                claim.decided(Verdict::Proved, margin, format!("relative margin {}, {cells} cells", at_least(margin)))
-            }
+            BoxOutcome::Proved(margin) => claim.decided(
+                Verdict::Proved,
+                margin,
+                format!("{}, relative margin {}, {cells} cells", self.name, at_least(margin)),
+            ),
             BoxOutcome::Fails { at: rho, broken } => {
                 let margin = broken.map_or(f64::NAN, |(_, value)| value);
                 claim.decided(Verdict::Undecided, margin, format!("its condition fails at {}", at(&rho)))
