@@ -6,8 +6,10 @@ pub mod gain;
 mod model;
 mod objective;
 mod solve;
+mod transformed;
 mod verdict;
 
+use crate::certify::polytopic::Transformed;
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::{file as scenario_file, weights};
@@ -41,6 +43,8 @@ pub struct ProblemPlan {
     pub places: Vec<String>,
     /// Names of the states, where the plant has them.
     pub states: Vec<String>,
+    /// Of a tensor-product model: its weights, and the LPV model that it stands for.
+    pub transformed: Option<Transformed>,
     /// The models: vertices, or points of a frozen design.
     pub models: Vec<FrozenModel>,
     /// How they are used.
@@ -129,9 +133,8 @@ impl ProblemPlan {
         }
         let initial = initial(&door, &design, &source, lyapunov)?;
         let mut plan = Self {
-            states: source.plant.as_ref().map_or(Vec::new(), |plant| {
-                plant.description().states.iter().map(|state| state.name.clone()).collect()
-            }),
+            states: source.states.iter().map(|state| state.name.clone()).collect(),
+            transformed: source.transformed,
             places: source.places,
             models: source.models,
             scope,

@@ -305,7 +305,7 @@ fn member_rate(claims: &[Claim], member: Member) -> Option<f64> {
     let rate = |motion: &Motion| match motion {
         Motion::AtRest => 0.0,
         Motion::Bounded { rate } => *rate,
-        Motion::None | Motion::Hull | Motion::Any => f64::INFINITY,
+        Motion::None | Motion::Hull | Motion::Any | Motion::WithinRanges => f64::INFINITY,
     };
     let stays = |claim: &Claim| match &claim.kind {
         ClaimKind::Invariance { level, motion } => Some((Some(*level), rate(motion))),

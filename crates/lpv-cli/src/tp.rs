@@ -10,8 +10,9 @@ use crate::scenario::read_text;
 use clap::Args;
 use lpv::math::decimal::{at_most, fixed};
 use lpv::math::matrix::to_rows;
+use lpv::model::ModelSource;
 use lpv::model::tensor_product::{Accuracy, HullQuality, TensorProductError, TensorProductModel, Weighting};
-use model::TransformationPlan;
+pub use model::TransformationPlan;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -25,9 +26,17 @@ pub struct TpArguments {
     output: OutputArguments,
 }
 
+/// What the JSON says that it is; of another number its keys mean something else.
+pub const FORMAT: &str = "lpv tp 1";
+
 #[derive(Serialize)]
 struct TpRecord<'a> {
+    format: &'static str,
     model: &'a str,
+    /// The function that was transformed, where it is an LPV model with a name: what a design is proved for.
+    lpv_model: &'a Option<ModelSource>,
+    /// It is a regulator's gain and no model.
+    is_gain: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     source: Option<&'static str>,
     /// Rows and columns of the matrices.
@@ -76,7 +85,8 @@ pub fn run(arguments: &TpArguments) -> Result<(), Failure> {
     print(&if output.json { json } else { text(&record) })
 }
 
-fn refusal(file: &Path, error: &TensorProductError) -> Failure {
+/// A transformation that cannot be made, in the words of its file.
+pub fn refusal(file: &Path, error: &TensorProductError) -> Failure {
     let key = match error {
         TensorProductError::NoParameter | TensorProductError::Grid { .. } => "parameter",
         TensorProductError::NoRule | TensorProductError::Rank { .. } => "transformation.ranks",
@@ -116,7 +126,10 @@ fn record<'a>(plan: &'a TransformationPlan, model: &'a TensorProductModel, secon
         Vertex { weights, matrix: entries.chunks(cols).map(<[f64]>::to_vec).collect() }
     });
     TpRecord {
+        format: FORMAT,
         model: &plan.title,
+        lpv_model: &plan.lpv_model,
+        is_gain: plan.is_gain,
         source: plan.source,
         size: model.size,
         parameters: parameters.collect(),

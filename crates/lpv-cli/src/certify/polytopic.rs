@@ -4,15 +4,19 @@
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::engineers_words;
-use lpv::certificate::{Claim, Member, PolytopicClaim, PolytopicLyapunov, Record, RecordError, prove_polytopic};
+use lpv::certificate::{
+    Claim, MOST_CELLS, Member, PolytopicClaim, PolytopicLyapunov, Record, RecordError, ScheduledClaim, prove_polytopic,
+    prove_scheduled,
+};
 use lpv::math::Mat;
 use lpv::math::decimal::about;
 use lpv::math::definite::{Definiteness, asymmetry, definiteness, smallest_eigenvalue_about};
 use lpv::math::matrix::{from_rows, identity, is_finite};
-use lpv::model::Polytope;
+use lpv::model::tensor_product::TensorProductSchedule;
+use lpv::model::{ModelSource, Polytope};
 use lpv::synthesis::CostWeights;
 use lpv::synthesis::polytopic::InputBounds;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 type Rows = Vec<Vec<f64>>;
 /// Relative difference of what a file says twice: inverses are no better.
@@ -26,6 +30,8 @@ struct PolytopicFile {
     lyapunov: Option<Kind>,
     model: ModelTable,
     model_hash: Option<String>,
+    /// Where the vertices are those of a tensor-product model: its weights, and the LPV model that it stands for.
+    tensor_product: Option<Transformed>,
     weights: Option<WeightsTable>,
     /// Null where an input is not limited.
     sigma: Option<Vec<Option<f64>>>,
@@ -58,6 +64,41 @@ struct ModelTable {
     a: Matrices,
     #[serde(rename = "B")]
     b: Matrices,
+}
+
+/// What a design file says of the transformation that its vertices came from.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Transformed {
+    /// The LPV model; null where only samples of it were known.
+    pub source: Option<ModelSource>,
+    /// Grid and weights of each parameter: what schedules K.
+    pub parameters: TensorProductSchedule,
+}
+
+impl Transformed {
+    /// Whether it makes sense, for `count` vertices; `key` is what it is called in the file.
+    pub fn check(&self, door: &Door, key: &str, count: usize) -> Result<(), Failure> {
+        if let Err(error) = self.parameters.check() {
+            return door.refuse(format!("{key}.parameters"), error.to_string());
+        }
+        if self.parameters.vertices() != count {
+            let message = format!("makes {} vertices, and the model has {count}", self.parameters.vertices());
+            return door.refuse(format!("{key}.parameters"), message);
+        }
+        let Some(source) = &self.source else { return Ok(()) };
+        let model = source.build().or_else(|error| door.refuse(format!("{key}.source"), error.to_string()))?;
+        let given: Vec<&str> =
+            self.parameters.parameters.iter().map(|parameter| parameter.grid.name.as_str()).collect();
+        let own: Vec<&str> = model.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+        match given == own {
+            true => Ok(()),
+            false => door.refuse(
+                format!("{key}.parameters"),
+                format!("are {}: those of {} are {}, in this order", given.join(", "), source.name(), own.join(", ")),
+            ),
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -154,12 +195,32 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
         weights: weights.clone(),
         saturation: saturation.clone(),
     };
+    if let Some(transformed) = &file.tensor_product {
+        transformed.check(door, "tensor_product", count)?;
+        if kind == Kind::Frozen {
+            return door
+                .refuse("lyapunov", "is \"frozen\": a tensor-product model has vertices, and no designs at points");
+        }
+        let built = transformed.source.as_ref().and_then(|source| source.build().ok());
+        if let Some(model) = built.filter(|model| (model.states.len(), model.inputs) != (n, m)) {
+            let sizes = [model.states.len(), model.inputs];
+            let message = format!("has {} states and {} inputs: the vertices have {n} and {m}", sizes[0], sizes[1]);
+            return door.refuse("tensor_product.source", message);
+        }
+    }
     let mut proved = |claim: PolytopicClaim| {
         let claims = prove_polytopic(&claim);
         let unwritten =
             |error: RecordError| Failure::Unreadable { file: door.file.to_owned(), message: error.to_string() };
         record.add_polytopic(&claim, &claims).map_err(unwritten)?;
-        Ok(claims)
+        Ok(match &file.tensor_product {
+            None => claims,
+            Some(Transformed { source, parameters: schedule }) => {
+                let source = source.as_ref();
+                let claim = ScheduledClaim { polytopic: &claim, schedule, source, most_cells: MOST_CELLS };
+                prove_scheduled(&claim, claims)
+            }
+        })
     };
     match kind {
         Kind::ParameterDependent => {

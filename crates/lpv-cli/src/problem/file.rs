@@ -28,6 +28,8 @@ pub struct ModelTable {
     pub grid_points: Option<usize>,
     /// Part of the range of the plant's parameter.
     pub range: Option<Vec<f64>>,
+    /// Path of a tensor-product model: a model file of `lpv tp`, or what it wrote.
+    pub tensor_product: Option<String>,
 }
 
 /// One matrix as rows, or a list of them.

@@ -1,12 +1,15 @@
 //! The models of a problem: vertices as matrices, or linearisations of a plant.
 
 use super::file::{LyapunovName, Matrices, ModelTable};
+use super::transformed::tensor_product_models;
 use super::{convex_weights, matrix};
+use crate::certify::polytopic::Transformed;
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::file as scenario_file;
 use lpv::math::Mat;
 use lpv::model::{FrozenModel, GridModel, Polytope, linearize};
+use lpv::plant::Signal;
 
 /// The models of a file, before it is known what for.
 pub(super) struct Source {
@@ -15,6 +18,10 @@ pub(super) struct Source {
     /// Of matrices: the polytope, of which the models may be points.
     pub polytope: Option<Polytope>,
     pub plant: Option<Box<dyn lpv::plant::Plant>>,
+    /// The states, where they have names.
+    pub states: Vec<Signal>,
+    /// Of a tensor-product model: where the vertices come from.
+    pub transformed: Option<Transformed>,
 }
 
 /// The models of the tables `[model]` and `[plant]`.
@@ -30,12 +37,43 @@ pub(super) fn models(
         (None, Some(name)) => Some(toml::Table::from_iter([("name".to_owned(), toml::Value::String(name.clone()))])),
         (None, None) => None,
     };
+    if let Some(name) = &model.tensor_product {
+        return tensor_product(door, name, &model, table.is_some(), lyapunov);
+    }
     match (table, model.a.is_some() || model.b.is_some()) {
         (Some(_), true) => door.refuse("model", "has matrices and a plant; keep one"),
-        (None, false) => door.refuse("model", "is empty: give the matrices A and B, or plant = \"…\""),
+        (None, false) => {
+            door.refuse("model", "is empty: give the matrices A and B, plant = \"…\", or tensor_product = \"FILE\"")
+        }
         (Some(table), false) => plant_models(door, model, table),
         (None, true) => matrix_models(door, model, lyapunov),
     }
+}
+
+fn tensor_product(
+    door: &Door,
+    name: &str,
+    model: &ModelTable,
+    has_plant: bool,
+    lyapunov: LyapunovName,
+) -> Result<Source, Failure> {
+    for (key, given) in [
+        ("model.A", model.a.is_some()),
+        ("model.B", model.b.is_some()),
+        ("model.plant", has_plant),
+        ("model.grid", model.grid.is_some()),
+        ("model.grid_points", model.grid_points.is_some()),
+        ("model.range", model.range.is_some()),
+    ] {
+        if given {
+            return door.refuse(key, "and tensor_product are both given: its file has the whole model; keep one");
+        }
+    }
+    if lyapunov == LyapunovName::Frozen {
+        let message = "is \"frozen\": the vertices of a tensor-product model are no points of it; allowed are \"common\" and \"parameter-dependent\"";
+        return door.refuse("design.lyapunov", message);
+    }
+    tensor_product_models(door, name)
 }
 
 fn matrix_models(door: &Door, model: ModelTable, lyapunov: LyapunovName) -> Result<Source, Failure> {
@@ -74,7 +112,7 @@ fn matrix_models(door: &Door, model: ModelTable, lyapunov: LyapunovName) -> Resu
             ((0..count).map(|i| polytope.vertex(i)).collect::<Vec<_>>(), (0..count).map(place).collect::<Vec<_>>())
         }
     };
-    Ok(Source { models, places, polytope: Some(polytope), plant: None })
+    Ok(Source { models, places, polytope: Some(polytope), plant: None, states: Vec::new(), transformed: None })
 }
 
 fn plant_models(door: &Door, model: ModelTable, table: toml::Table) -> Result<Source, Failure> {
@@ -88,7 +126,9 @@ fn plant_models(door: &Door, model: ModelTable, table: toml::Table) -> Result<So
             }
         }
         let models = vec![linearize(&*plant, 0.0)];
-        return Ok(Source { models, places: vec!["the operating point".into()], polytope: None, plant: Some(plant) });
+        let places = vec!["the operating point".into()];
+        let states = plant.description().states.clone();
+        return Ok(Source { models, places, polytope: None, plant: Some(plant), states, transformed: None });
     };
     let count = model.grid_points.unwrap_or(8);
     if !(2..=512).contains(&count) {
@@ -117,5 +157,6 @@ fn plant_models(door: &Door, model: ModelTable, table: toml::Table) -> Result<So
         }
     };
     let places = models.iter().map(|model| format!("{} = {:.6}", scheduling.parameter, model.rho)).collect();
-    Ok(Source { models, places, polytope: None, plant: Some(plant) })
+    let states = plant.description().states.clone();
+    Ok(Source { models, places, polytope: None, plant: Some(plant), states, transformed: None })
 }

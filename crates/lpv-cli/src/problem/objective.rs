@@ -2,6 +2,7 @@
 
 use super::file::{DesignTable, LyapunovName, MethodName, ObjectiveName};
 use super::model::Source;
+use super::transformed::check_initial;
 use super::{Initial, convex_weights, matrix, state};
 use crate::failure::Failure;
 use crate::scenario::door::Door;
@@ -109,6 +110,9 @@ pub(super) fn initial(
         return door.refuse("design.initial_state", "method \"stabilize\" has no cost to bound; remove it");
     }
     state(door, "design.initial_state", x, source.models[0].a.nrows())?;
+    if let Some(transformed) = &source.transformed {
+        check_initial(door, x, design.initial_parameter.as_deref(), transformed, &source.states)?;
+    }
     let key = "design.initial_parameter";
     let (parameter, model) = match (&design.initial_parameter, &source.polytope, &source.plant) {
         (None, _, _) if lyapunov == LyapunovName::Common || source.models.len() == 1 => {

@@ -2,11 +2,11 @@
 
 use super::verdict::{failure_at, verdict};
 use super::{ProblemPlan, Scope};
-use crate::certify::polytopic;
+use crate::certify::polytopic::{self, Transformed};
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use lmi::{Explanation, Outcome, Witness};
-use lpv::certificate::{Claim, Record, Verdict, worst};
+use lpv::certificate::{Claim, Of, Record, Verdict, worst};
 use lpv::math::Mat;
 use lpv::math::decimal::{Rounding, about, at_least, at_most, decimal, fixed};
 use lpv::math::eigen::symmetric_eigenvalues;
@@ -63,6 +63,9 @@ pub struct Report {
     model: ModelMatrices,
     /// Fingerprint of the model.
     model_hash: String,
+    /// Of a tensor-product model: its weights, and the LPV model that the design is proved for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tensor_product: Option<Transformed>,
     #[serde(skip_serializing_if = "Option::is_none")]
     weights: Option<WeightMatrices>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -169,7 +172,7 @@ pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
     let tried: &[BackOff] = if plan.back_off == BackOff::Knee { &PROVABLE } else { &[plan.back_off] };
     let started = Instant::now();
     let mut iterations = 0;
-    let mut first = None;
+    let (mut of_polytope, mut first) = (None, None);
     for &back_off in tried {
         let mut report = solve_with(plan, path, back_off)?;
         iterations += report.iterations;
@@ -179,16 +182,32 @@ pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
         report.take_what_is_proved(plan, &claims);
         report.iterations = iterations;
         report.seconds = started.elapsed().as_secs_f64();
-        let is_stalled = report.status == INACCURATE && report.k.is_some();
-        let is_final = report.status != SOLVED && !is_stalled;
-        if is_final || report.status == SOLVED && report.is_proved_by(plan, &claims) {
-            let answer = first.filter(|_| report.status != SOLVED).unwrap_or(report);
-            return Ok(answer.without_unproved_gain());
+        if report.status != SOLVED {
+            // of a solver that stopped short on the way more of the optimum given back may be found
+            if report.status == INACCURATE && report.k.is_some() {
+                first.get_or_insert(report);
+                continue;
+            }
+            return Ok(of_polytope.or(first).unwrap_or(report).without_unproved_gain());
         }
-        first.get_or_insert(report);
+        match report.is_proved_by(plan, &claims) {
+            Worth::Everything => return Ok(report),
+            Worth::Polytope => of_polytope.get_or_insert(report),
+            Worth::Nothing => first.get_or_insert(report),
+        };
     }
-    let first = first.ok_or_else(|| Failure::Defect("no back-off was tried".into()))?;
-    Ok(first.without_unproved_gain())
+    let answer = of_polytope.or(first).ok_or_else(|| Failure::Defect("no back-off was tried".into()))?;
+    Ok(answer.without_unproved_gain())
+}
+
+/// What is proved of a design.
+enum Worth {
+    /// Every claim.
+    Everything,
+    /// Every claim about the polytope, and of the LPV model that it stands for not every one.
+    Polytope,
+    /// Less.
+    Nothing,
 }
 
 /// What `lpv certify` says of the report as a file.
@@ -300,6 +319,7 @@ fn report(
             b: plan.models.iter().map(|model| to_rows(&model.b)).collect(),
         },
         model_hash: Polytope::hull(&plan.models).fingerprint(),
+        tensor_product: plan.transformed.clone(),
         weights: plan.weights.as_ref().map(|weights| WeightMatrices { q: to_rows(&weights.q), r: to_rows(&weights.r) }),
         sigma: plan.saturation.as_ref().map(|bounds| bounds.sigma.clone()),
         gamma: plan.saturation.as_ref().map(|bounds| bounds.gamma),
@@ -439,8 +459,8 @@ impl Report {
         self
     }
 
-    /// Take the verdict from the `claims` about the file; whether all of them are proved. What is not is no solution.
-    fn is_proved_by(&mut self, plan: &ProblemPlan, claims: &[Claim]) -> bool {
+    /// Take the verdict from the `claims` about the file. What is not proved of the polytope is no solution.
+    fn is_proved_by(&mut self, plan: &ProblemPlan, claims: &[Claim]) -> Worth {
         if !claims.is_empty() && worst(claims) == Verdict::Proved {
             if self.verdict == Verdict::Numerical {
                 self.verdict = Verdict::Proved;
@@ -448,10 +468,30 @@ impl Report {
                     "verified for Y and L at all vertices",
                     "every claim of lpv certify about K and P as they are printed",
                 );
+                if plan.transformed.is_some() {
+                    self.verdict_reason += ", and for the LPV model itself in the ranges of its parameters, whatever the transformation's error";
+                }
             }
-            return true;
+            return Worth::Everything;
         }
         let open = claims.iter().find(|claim| claim.verdict != Verdict::Proved);
+        let is_of_model =
+            |claim: &&Claim| !matches!(claim.id.name, "weights" | "lyapunov-definite") && claim.of != Of::Polytope;
+        let of_polytope = claims.iter().filter(|claim| plan.transformed.is_none() || !is_of_model(claim));
+        if let Some(claim) = open.filter(|_| of_polytope.clone().all(|claim| claim.verdict == Verdict::Proved))
+            && plan.transformed.is_some()
+        {
+            if self.verdict != Verdict::Undecided {
+                self.verdict = Verdict::Undecided;
+                self.verdict_reason = format!(
+                    "proved of the polytope of the vertices alone; of the LPV model \"{}\" is {}: {}",
+                    claim.claim,
+                    claim.verdict.word(),
+                    claim.detail
+                );
+            }
+            return Worth::Polytope;
+        }
         let open = open.map_or(String::new(), |claim| format!(": \"{}\" is {}", claim.claim, claim.verdict.word()));
         self.status = INACCURATE;
         self.verdict = Verdict::Undecided;
@@ -460,7 +500,7 @@ impl Report {
             _ => "give more of the optimum back, or leave back_off out",
         };
         self.verdict_reason = format!("the design that was found cannot be proved{open}; {remedy}");
-        false
+        Worth::Nothing
     }
 
     /// The answer as text.

@@ -9,9 +9,9 @@ use crate::scenario::weights::definite;
 use lpv::math::Mat;
 use lpv::math::matrix::from_rows;
 use lpv::math::riccati;
-use lpv::model::linearize;
 use lpv::model::literature::LiteratureModel;
 use lpv::model::tensor_product::{ParameterGrid, RankRule, TensorProductOptions, Weighting};
+use lpv::model::{ModelSource, linearize};
 use std::path::Path;
 
 /// Numbers that the samples may hold: 400 MB.
@@ -36,6 +36,10 @@ pub struct TransformationPlan {
     pub title: String,
     /// Where a literature model is from.
     pub source: Option<&'static str>,
+    /// The LPV model that is transformed; `None` of samples, and of a regulator.
+    pub lpv_model: Option<ModelSource>,
+    /// What is transformed is a regulator's gain and no model.
+    pub is_gain: bool,
     /// The matrix-valued function.
     pub function: Function,
     /// Its parameters.
@@ -48,6 +52,8 @@ pub struct TransformationPlan {
 struct Source {
     title: String,
     source: Option<&'static str>,
+    lpv_model: Option<ModelSource>,
+    is_gain: bool,
     function: Function,
     /// The parameters; `None` for samples, whose grids stand in the file.
     parameters: Option<Vec<Known>>,
@@ -100,7 +106,8 @@ impl TransformationPlan {
             }
         }
         let options = options(&door, file.transformation, grids.len())?;
-        Ok(Self { title: source.title, source: source.source, function: source.function, grids, options })
+        let Source { title, source, lpv_model, is_gain, function, .. } = source;
+        Ok(Self { title, source, lpv_model, is_gain, function, grids, options })
     }
 }
 
@@ -126,6 +133,8 @@ fn of_literature(door: &Door, table: toml::Table) -> Result<Source, Failure> {
     Ok(Source {
         title: format!("[A B] of {name}"),
         source: Some(model.source()),
+        lpv_model: Some(ModelSource::Literature(model)),
+        is_gain: false,
         function: Box::new(move |rho| model.at(rho)),
         parameters: Some(parameters),
         samples: None,
@@ -133,7 +142,8 @@ fn of_literature(door: &Door, table: toml::Table) -> Result<Source, Failure> {
 }
 
 fn of_plant(door: &Door, table: toml::Table, weights: Option<WeightsTable>) -> Result<Source, Failure> {
-    let plant = plant(door, table)?.build().or_else(|error| door.refuse("plant", error.to_string()))?;
+    let spec = plant(door, table)?;
+    let plant = spec.build().or_else(|error| door.refuse("plant", error.to_string()))?;
     let description = plant.description();
     let Some(scheduling) = description.scheduling.clone() else {
         let message = format!("\"{}\" has no scheduling parameter: there is nothing to transform", description.name);
@@ -147,7 +157,9 @@ fn of_plant(door: &Door, table: toml::Table, weights: Option<WeightsTable>) -> R
             let n = point.a.ncols();
             Mat::from_fn(n, n + point.b.ncols(), |i, j| if j < n { point.a[(i, j)] } else { point.b[(i, j - n)] })
         });
-        return Ok(Source { title: format!("[A B] of {name}"), source: None, function, parameters, samples: None });
+        let lpv_model = Some(ModelSource::Plant(spec));
+        let title = format!("[A B] of {name}");
+        return Ok(Source { title, source: None, lpv_model, is_gain: false, function, parameters, samples: None });
     };
     let (n, m) = (description.states.len(), description.inputs.len());
     let q = definite(door, "weights.Q", weights.q, weights.q_diag, n)?;
@@ -159,7 +171,7 @@ fn of_plant(door: &Door, table: toml::Table, weights: Option<WeightsTable>) -> R
             .map_or_else(|_| Mat::from_fn(m, n, |_, _| f64::NAN), |regulator| regulator.k)
     });
     let title = format!("the regulator K of {name}, u = -Kx");
-    Ok(Source { title, source: None, function, parameters, samples: None })
+    Ok(Source { title, source: None, lpv_model: None, is_gain: true, function, parameters, samples: None })
 }
 
 fn of_samples(door: &Door, table: toml::Table, parameters: &[ParameterTable]) -> Result<Source, Failure> {
@@ -185,6 +197,8 @@ fn of_samples(door: &Door, table: toml::Table, parameters: &[ParameterTable]) ->
     Ok(Source {
         title: "samples".into(),
         source: None,
+        lpv_model: None,
+        is_gain: false,
         function: Box::new(move |rho| interpolated(&matrices, &grids, rho)),
         parameters: None,
         samples: Some(count),

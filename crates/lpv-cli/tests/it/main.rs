@@ -13,3 +13,4 @@ mod stages;
 mod step_bounds;
 mod thesis;
 mod transformation;
+mod transformed;

@@ -19,8 +19,9 @@ pub use excursion::{Excursion, excursion};
 pub use inequality::{BlockMargin, block_margins};
 pub use lyapunov::{LyapunovFunction, unsaturated_level};
 pub use proof::{
-    COST_INFLATION, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs, Record,
-    RecordError, SampledCost, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic, prove_sampled_cost,
+    COST_INFLATION, MOST_CELLS, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs,
+    Record, RecordError, SampledCost, ScheduledClaim, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic,
+    prove_sampled_cost, prove_scheduled,
 };
 pub use rest::{Unrest, rests_exactly, unrest};
 pub use stability::{StabilityMargin, frozen_stability};

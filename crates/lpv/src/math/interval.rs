@@ -7,6 +7,7 @@
 //! gives the whole line.
 
 use super::scalar::Scalar;
+use super::sinc::sinc_and_derivatives;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A closed interval [lo, hi].
@@ -293,6 +294,10 @@ impl Scalar for Interval {
         let bend = Self { lo: -half, hi: half };
         let within = |x: Self| Self { lo: x.lo.clamp(-1.0, 1.0), hi: x.hi.clamp(-1.0, 1.0) };
         (within(sin + delta * cos + bend), within(cos - delta * sin + bend))
+    }
+
+    fn sinc(self) -> Self {
+        sinc_and_derivatives(self)[0]
     }
 }
 

@@ -22,6 +22,7 @@ pub mod riccati;
 pub mod scalar;
 pub mod schur_cohn;
 pub mod separation;
+pub mod sinc;
 pub mod stabilizability;
 pub mod stein;
 pub mod taylor;

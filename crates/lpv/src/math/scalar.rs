@@ -22,12 +22,20 @@ pub trait Scalar:
 {
     /// (sin x, cos x)
     fn sin_cos(self) -> (Self, Self);
+
+    /// sin x / x, and 1 at zero.
+    fn sinc(self) -> Self;
 }
 
 impl Scalar for f64 {
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
         f64::sin_cos(self)
+    }
+
+    #[inline]
+    fn sinc(self) -> Self {
+        if self == 0.0 { 1.0 } else { self.sin() / self }
     }
 }
 
@@ -42,6 +50,11 @@ impl Scalar for Dual {
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
         DualNum::sin_cos(&self)
+    }
+
+    #[inline]
+    fn sinc(self) -> Self {
+        self.sph_j0()
     }
 }
 

@@ -6,6 +6,7 @@
 
 use super::interval::Interval;
 use super::scalar::Scalar;
+use super::sinc::sinc_and_derivatives;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// f, f′ and, where it is asked for, f″.
@@ -111,6 +112,12 @@ impl Scalar for Taylor {
             Self { value: cos, slope: -(sin * self.slope), bend: self.bend.map(|f| -(sin * f) - cos * square) };
         (sine, cosine)
     }
+
+    fn sinc(self) -> Self {
+        let [value, first, second] = sinc_and_derivatives(self.value);
+        let bend = self.bend.map(|bend| second * self.slope.square() + first * bend);
+        Self { value, slope: first * self.slope, bend }
+    }
 }
 
 /// f and ∂f/∂s, both as functions of t.
@@ -190,6 +197,16 @@ impl Scalar for TaylorDual {
             Self { value: cos, derivative: -(sin * self.derivative) },
         )
     }
+
+    /// sinc′ as a function of t has the derivatives sinc″ and, at most 1/4 everywhere, sinc‴.
+    fn sinc(self) -> Self {
+        let Taylor { value: x, slope, bend } = self.value;
+        let [_, first, second] = sinc_and_derivatives(x);
+        let third = Interval::new(-0.25, 0.25);
+        let bend = bend.map(|bend| third * slope.square() + second * bend);
+        let derivative = Taylor { value: first, slope: second * slope, bend };
+        Self { value: self.value.sinc(), derivative: derivative * self.derivative }
+    }
 }
 
 macro_rules! with_numbers {
@@ -221,7 +238,7 @@ mod tests {
 
     fn function<S: Scalar>(t: S) -> S {
         let (sin, cos) = (t * 2.0).sin_cos();
-        (sin * cos + t * t - 0.3) / (cos * 0.5 + 2.0)
+        (sin * cos + t * t - 0.3 + (t * 3.0).sinc()) / (cos * 0.5 + 2.0)
     }
 
     /// f(t) of random t in a cell lies in the Taylor form of the cell.

@@ -8,12 +8,14 @@ mod grid;
 pub mod literature;
 mod polytope;
 mod polytopic;
+mod source;
 pub mod tensor_product;
 
 pub use basis::{BasisFunction, MatrixFunction};
 pub use grid::{FrozenModel, GridModel, linearize, parameter_grid};
 pub use polytope::{Polytope, PolytopeError};
 pub use polytopic::{BoxWeights, PolytopicModel};
+pub use source::{ModelSource, SourceError, SourceModel, SourceParameter};
 
 use crate::plant::{Plant, PlantSpec, Signal};
 use serde::{Deserialize, Serialize};

@@ -16,5 +16,6 @@ mod records;
 mod rowwise;
 mod sampled;
 mod sampled_cost;
+mod scheduled;
 mod synthesis;
 mod tensor_product;

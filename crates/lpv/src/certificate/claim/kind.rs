@@ -19,6 +19,8 @@ pub enum Motion {
     Hull,
     /// Any motion.
     Any,
+    /// Any motion within the ranges of the parameters.
+    WithinRanges,
 }
 
 /// What is claimed.
@@ -54,6 +56,20 @@ pub enum ClaimKind {
         level: Option<f64>,
         /// Of the parameter.
         motion: Motion,
+    },
+    /// The tensor-product model is at most this far from the LPV model, everywhere in the ranges of the parameters.
+    TransformationError {
+        /// Of ‖A(ρ) − Σ wᵢ(ρ)Aᵢ‖, Frobenius.
+        a: f64,
+        /// Of ‖B(ρ) − Σ wᵢ(ρ)Bᵢ‖, Frobenius.
+        b: f64,
+    },
+    /// On {V ≤ γ} the states that are parameters stay in the ranges of these.
+    StatesInRange {
+        /// γ
+        level: f64,
+        /// Their names.
+        states: Vec<String>,
     },
     /// The loop with zero-order hold is stable at every fixed ρ, while no input saturates.
     SampledStability {
@@ -139,6 +155,8 @@ impl ClaimKind {
             Self::Decrease { .. } => "decrease",
             Self::Invariance { .. } => "invariance",
             Self::Cost { .. } => "cost",
+            Self::TransformationError { .. } => "transformation-error",
+            Self::StatesInRange { .. } => "states-in-range",
             Self::SampledStability { .. } => "sampled-stability",
             Self::SampledInvariance { .. } => "sampled-invariance",
             Self::SampledCost { .. } => "sampled-cost",

@@ -52,6 +52,8 @@ pub enum Of {
     Model,
     /// The nonlinear plant.
     Plant,
+    /// The polytope of the vertices that stand for an LPV model, where the model itself is known.
+    Polytope,
 }
 
 /// Which part of a design a claim is about.
@@ -95,6 +97,7 @@ impl fmt::Display for ClaimId {
         match self.subject.of {
             Of::Model => {}
             Of::Plant => f.write_str("plant.")?,
+            Of::Polytope => f.write_str("polytope.")?,
         }
         f.write_str(self.name)
     }
@@ -163,6 +166,7 @@ impl Claim {
         let about = match of {
             Of::Model => "",
             Of::Plant => "the nonlinear plant: ",
+            Of::Polytope => "the polytope: ",
         };
         Self {
             claim: format!("{about}{}", kind.sentence(words)),
@@ -200,6 +204,15 @@ impl Claim {
     /// The same about the nonlinear plant; its premises stay those of the model.
     pub fn of_plant(mut self) -> Self {
         (self.of, self.id.subject.of) = (Of::Plant, Of::Plant);
+        self
+    }
+
+    /// The same about the polytope alone, with the premises in `names`, which are about it too.
+    pub fn of_polytope(mut self, names: &[&'static str]) -> Self {
+        (self.of, self.id.subject.of) = (Of::Polytope, Of::Polytope);
+        let moved = self.premises.iter_mut().filter(|premise| names.contains(&premise.name));
+        moved.for_each(|premise| premise.subject.of = Of::Polytope);
+        self.claim = format!("the polytope: {}", self.claim);
         self
     }
 

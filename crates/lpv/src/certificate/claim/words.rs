@@ -28,6 +28,7 @@ impl ClaimKind {
                 " for every motion of the parameter in the polytope with rates in the hull of rate_vertices".into()
             }
             Motion::Any => " for every motion of the parameter in the polytope".into(),
+            Motion::WithinRanges => format!(" for every motion of {parameter}"),
         };
         match self {
             Self::Weights => "Q is positive semidefinite and R is positive definite".into(),
@@ -42,6 +43,18 @@ impl ClaimKind {
             Self::Cost { factor, level, motion } => {
                 let from = level.map_or(String::new(), |level| format!(" from {v} <= {}", at_least(level)));
                 format!("the cost is at most {} {}{from}{}", at_most(*factor), of_the_start(v), moving(motion))
+            }
+            Self::TransformationError { a, b } => format!(
+                "the tensor-product model differs from the model by at most {} in A and {} in B (Frobenius norm){every}",
+                at_most(*a),
+                at_most(*b)
+            ),
+            Self::StatesInRange { level, states } => {
+                format!(
+                    "on {v} <= {} the states stay in the ranges of their parameters: {}",
+                    at_least(*level),
+                    states.join(", ")
+                )
             }
             Self::SampledStability { sample_time_s } => {
                 format!("the loop sampled with zero-order hold is stable at T = {sample_time_s} s{fixed}")

@@ -10,6 +10,7 @@ pub use pendulum_cart::PendulumCartParameters;
 pub use tora::ToraParameters;
 
 use crate::math::Mat;
+use crate::math::scalar::Scalar;
 use crate::plant::Signal;
 use serde::{Deserialize, Serialize};
 
@@ -126,15 +127,35 @@ impl LiteratureModel {
         }
     }
 
+    /// For each parameter the number of the state that it is, from 0; `None` of one from outside, such as a wind speed. With such
+    /// parameters ẋ = A(ρ(x))x + B(ρ(x))u is the nonlinear plant itself, as long as the states stay in the parameters' ranges.
+    pub fn parameter_states(&self) -> Vec<Option<usize>> {
+        match self {
+            Self::Tora(_) => vec![Some(2), Some(3)],
+            Self::Nata(_) => vec![None, Some(1)],
+            Self::PendulumCart(_) => vec![Some(1), Some(3)],
+        }
+    }
+
     /// S(ρ) = [A(ρ) B(ρ)], n × (n + m).
     ///
     /// # Panics
     /// If `rho` has fewer components than [`parameters`](Self::parameters).
     pub fn at(&self, rho: &[f64]) -> Mat<f64> {
+        let (entries, rows) = (self.over(rho), self.states().len());
+        let columns = entries.len() / rows;
+        Mat::from_fn(rows, columns, |i, j| entries[i * columns + j])
+    }
+
+    /// S(ρ) in row order, over any arithmetic: over intervals it holds S of every ρ in them.
+    ///
+    /// # Panics
+    /// If `rho` has fewer components than [`parameters`](Self::parameters).
+    pub fn over<S: Scalar>(&self, rho: &[S]) -> Vec<S> {
         match self {
-            Self::Tora(constants) => constants.at(rho),
-            Self::Nata(constants) => constants.at(rho),
-            Self::PendulumCart(constants) => constants.at(rho),
+            Self::Tora(constants) => constants.over(rho),
+            Self::Nata(constants) => constants.over(rho),
+            Self::PendulumCart(constants) => constants.over(rho),
         }
     }
 }

@@ -5,8 +5,7 @@
 //! L = ρU²b (c_lα e + c_lβ β), M = ρU²b² (c_mα e + c_mβ β), e = α + ḣ/U + (½ − a) b α̇/U.
 
 use super::{ConstantError, LiteratureParameter};
-use crate::math::Mat;
-use crate::math::matrix::from_rows;
+use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 
 pub const SOURCE: &str = "J. Ko, A. J. Kurdila, T. W. Strganac, Nonlinear control of a prototypical wing section with \
@@ -100,38 +99,41 @@ impl NataParameters {
         ConstantError::unless(holds, "inertia_kg_m2", self.inertia_kg_m2, allowed)
     }
 
-    /// S at ρ = (U, α), state (h, α, ḣ, α̇), input β.
-    pub fn at(&self, rho: &[f64]) -> Mat<f64> {
-        let (speed, pitch, b) = (rho[0], rho[1], self.semichord_m);
-        let static_moment = self.static_moment();
-        let determinant = self.mass_kg * self.inertia_kg_m2 - static_moment * static_moment;
-        let stiffness = self.pitch_stiffness_n_m.iter().rev().fold(0.0, |value, k| value * pitch + k);
-        let moment_slope = (0.5 + self.elastic_axis) * self.lift_slope;
-        let lift = self.air_density_kg_per_m3 * speed * b; // ρUb
-        let arm = (0.5 - self.elastic_axis) * b;
+    /// S at ρ = (U, α), state (h, α, ḣ, α̇), input β, row after row.
+    pub(super) fn over<S: Scalar>(&self, rho: &[S]) -> Vec<S> {
+        let [zero, one] = [0.0, 1.0].map(S::from);
+        let (speed, pitch, b) = (rho[0], rho[1], S::from(self.semichord_m));
+        let (mass, inertia) = (S::from(self.mass_kg), S::from(self.inertia_kg_m2));
+        let static_moment = mass * (S::from(self.mass_centre_m) - (S::from(self.elastic_axis) + 1.0) * b);
+        let determinant = mass * inertia - static_moment * static_moment;
+        let stiffness = self.pitch_stiffness_n_m.iter().rev().fold(zero, |value, k| value * pitch + *k);
+        let moment_slope = (S::from(self.elastic_axis) + 0.5) * self.lift_slope;
+        let lift = speed * self.air_density_kg_per_m3 * b; // ρUb
+        let arm = (-S::from(self.elastic_axis) + 0.5) * b;
         // generalised force (−L, M) minus spring and damper, by h, α, ḣ, α̇, β
         let plunge = [
-            -self.plunge_stiffness_n_per_m,
-            -lift * speed * self.lift_slope,
-            -self.plunge_damping_n_s_per_m - lift * self.lift_slope,
-            -lift * arm * self.lift_slope,
-            -lift * speed * self.flap_lift_slope,
+            S::from(-self.plunge_stiffness_n_per_m),
+            -(lift * speed * self.lift_slope),
+            -(lift * self.lift_slope) - self.plunge_damping_n_s_per_m,
+            -(lift * arm * self.lift_slope),
+            -(lift * speed * self.flap_lift_slope),
         ];
         let torsion = [
-            0.0,
+            zero,
             lift * speed * b * moment_slope - stiffness,
             lift * b * moment_slope,
             lift * b * arm * moment_slope - self.pitch_damping_n_m_s,
             lift * speed * b * self.flap_moment_slope,
         ];
-        let solve = |own: f64, force: &[f64; 5], coupling: f64, other: &[f64; 5]| {
-            force.iter().zip(other).map(|(f, o)| (own * f - coupling * o) / determinant).collect::<Vec<_>>()
+        let solve = |own: S, force: &[S; 5], coupling: S, other: &[S; 5]| {
+            [0, 1, 2, 3, 4].map(|j| (own * force[j] - coupling * other[j]) / determinant)
         };
-        from_rows(&[
-            vec![0.0, 0.0, 1.0, 0.0, 0.0],
-            vec![0.0, 0.0, 0.0, 1.0, 0.0],
-            solve(self.inertia_kg_m2, &plunge, static_moment, &torsion),
-            solve(self.mass_kg, &torsion, static_moment, &plunge),
-        ])
+        [
+            [zero, zero, one, zero, zero],
+            [zero, zero, zero, one, zero],
+            solve(inertia, &plunge, static_moment, &torsion),
+            solve(mass, &torsion, static_moment, &plunge),
+        ]
+        .concat()
     }
 }

@@ -3,8 +3,7 @@
 //! (M + m) r̈ + m l (θ̈ cos θ − θ̇² sin θ) = u and (4/3) l θ̈ + r̈ cos θ = g sin θ.
 
 use super::{ConstantError, LiteratureParameter};
-use crate::math::Mat;
-use crate::math::matrix::from_rows;
+use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_3;
 
@@ -46,26 +45,28 @@ impl PendulumCartParameters {
         ConstantError::unless_finite("gravity_m_per_s2", self.gravity_m_per_s2)
     }
 
-    /// S at ρ = (θ, θ̇), state (r, θ, ṙ, θ̇), input u. sin θ = (sin θ/θ) θ and θ̇² sin θ = (θ̇ sin θ) θ̇.
-    pub fn at(&self, rho: &[f64]) -> Mat<f64> {
+    /// S at ρ = (θ, θ̇), state (r, θ, ṙ, θ̇), input u, row after row. sin θ = (sin θ/θ) θ and θ̇² sin θ = (θ̇ sin θ) θ̇.
+    pub(super) fn over<S: Scalar>(&self, rho: &[S]) -> Vec<S> {
+        let [zero, one] = [0.0, 1.0].map(S::from);
         let (sin, cos) = rho[0].sin_cos();
-        let mass = self.cart_mass_kg + self.pole_mass_kg;
-        let moment = self.pole_mass_kg * self.half_length_m;
-        let length = 4.0 / 3.0 * self.half_length_m;
+        let mass = S::from(self.cart_mass_kg) + self.pole_mass_kg;
+        let moment = S::from(self.pole_mass_kg) * self.half_length_m;
+        let length = S::from(4.0) / 3.0 * self.half_length_m;
         let determinant = mass * length - moment * cos * cos;
-        let gravity = self.gravity_m_per_s2 * if rho[0] == 0.0 { 1.0 } else { sin / rho[0] };
+        let gravity = rho[0].sinc() * self.gravity_m_per_s2;
         let centrifugal = moment * rho[1] * sin;
-        from_rows(&[
-            vec![0.0, 0.0, 1.0, 0.0, 0.0],
-            vec![0.0, 0.0, 0.0, 1.0, 0.0],
-            vec![
-                0.0,
+        [
+            [zero, zero, one, zero, zero],
+            [zero, zero, zero, one, zero],
+            [
+                zero,
                 -moment * cos * gravity / determinant,
-                0.0,
+                zero,
                 length * centrifugal / determinant,
                 length / determinant,
             ],
-            vec![0.0, mass * gravity / determinant, 0.0, -cos * centrifugal / determinant, -cos / determinant],
-        ])
+            [zero, mass * gravity / determinant, zero, -cos * centrifugal / determinant, -cos / determinant],
+        ]
+        .concat()
     }
 }

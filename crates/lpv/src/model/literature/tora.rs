@@ -3,8 +3,7 @@
 //! ẍ₁ + x₁ = ε(θ̇² sin θ − θ̈ cos θ) and θ̈ + ε ẍ₁ cos θ = u.
 
 use super::{ConstantError, LiteratureParameter};
-use crate::math::Mat;
-use crate::math::matrix::from_rows;
+use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_4;
 
@@ -38,17 +37,19 @@ impl ToraParameters {
         ConstantError::unless(holds, "coupling", self.coupling, "it has to lie between 0 and 1")
     }
 
-    /// S at ρ = (θ, θ̇), state (x₁, ẋ₁, θ, θ̇).
-    pub fn at(&self, rho: &[f64]) -> Mat<f64> {
+    /// S at ρ = (θ, θ̇), state (x₁, ẋ₁, θ, θ̇), row after row.
+    pub(super) fn over<S: Scalar>(&self, rho: &[S]) -> Vec<S> {
+        let [zero, one] = [0.0, 1.0].map(S::from);
         let (sin, cos) = rho[0].sin_cos();
-        let centrifugal = self.coupling * rho[1] * sin;
-        let coupling = self.coupling * cos;
-        let determinant = 1.0 - coupling * coupling;
-        from_rows(&[
-            vec![0.0, 1.0, 0.0, 0.0, 0.0],
-            vec![-1.0 / determinant, 0.0, 0.0, centrifugal / determinant, -coupling / determinant],
-            vec![0.0, 0.0, 0.0, 1.0, 0.0],
-            vec![coupling / determinant, 0.0, 0.0, -centrifugal * coupling / determinant, 1.0 / determinant],
-        ])
+        let centrifugal = rho[1] * self.coupling * sin;
+        let coupling = cos * self.coupling;
+        let determinant = one - coupling * coupling;
+        [
+            [zero, one, zero, zero, zero],
+            [-one / determinant, zero, zero, centrifugal / determinant, -coupling / determinant],
+            [zero, zero, zero, one, zero],
+            [coupling / determinant, zero, zero, -centrifugal * coupling / determinant, one / determinant],
+        ]
+        .concat()
     }
 }

@@ -11,10 +11,12 @@
 
 mod minimum_volume;
 mod sampling;
+mod schedule;
 mod simplex;
 mod weighting;
 
 pub use sampling::{MatrixOf, ParameterGrid};
+pub use schedule::{ScheduleError, ScheduledParameter, TensorProductSchedule};
 pub use weighting::{HullQuality, WeightFunctions, Weighting};
 
 use crate::math::Mat;
@@ -251,6 +253,19 @@ impl TensorProductModel {
         };
         let dependencies = dependencies(samples, parameters.len());
         Ok(Self { size: [size.0, size.1], singular_values, ranks, weights, core, dependencies, accuracy, projections })
+    }
+
+    /// The weights as a controller evaluates them: on the grid, linear in between.
+    pub fn schedule(&self) -> TensorProductSchedule {
+        let of = |weights: &WeightFunctions| ScheduledParameter::new(weights.grid.clone(), &weights.values);
+        TensorProductSchedule { parameters: self.weights.iter().map(of).collect() }
+    }
+
+    /// The vertex matrices, the last parameter's weight running fastest.
+    pub fn vertices(&self) -> Vec<Mat<f64>> {
+        let [rows, cols] = self.size;
+        let matrix = |entries: &[f64]| Mat::from_fn(rows, cols, |i, j| entries[i * cols + j]);
+        self.core.entries().chunks(rows * cols).map(matrix).collect()
     }
 
     /// The TP model's matrix for given weights of each parameter: the core contracted with them.

@@ -9,6 +9,7 @@ mod mutation;
 mod narrow;
 mod polytope;
 mod sampled;
+mod scheduled;
 mod weights;
 
 use crate::Tally;
@@ -38,6 +39,7 @@ pub const KINDS: &[Kind] = &[
     Kind { name: "gain", cases: 250, run: gain::case },
     Kind { name: "governed", cases: 250, run: governed::case },
     Kind { name: "mutation", cases: 1500, run: mutation::case },
+    Kind { name: "scheduled", cases: 300, run: scheduled::case },
 ];
 
 /// M₀ and small multiples of random matrices with the powers of ρ up to `degree`.
