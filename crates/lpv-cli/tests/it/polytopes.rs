@@ -58,7 +58,8 @@ impl Polytope {
             symmetric_eigenvalues(&(&k * k.transpose())).into_iter().fold(0.0, f64::max).sqrt()
         };
         let gain = matrices.iter().map(gain).fold(0.0, f64::max);
-        let most = if method == "lpvqr" { 5.0 * self.gain_at_90_percent.unwrap() } else { 1e4 };
+        let outside = self.gain_at_90_percent.unwrap();
+        let most = if method == "lpvqr" { 5.0 * outside } else { outside.max(1e4) };
         let achieved = design["achieved"].as_f64().unwrap();
         let least = if method == "lpvqr" { 0.8 * self.trace.unwrap() } else { 0.0 };
         let proved = certificate["verdict"] == "proved" && design["verdict"] == "proved";

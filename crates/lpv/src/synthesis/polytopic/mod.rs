@@ -310,8 +310,15 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
             problem.moved(&at, with_margin(LESS * margins.fold(f64::INFINITY, f64::min)))
         });
         if let Some(answer) = moved {
-            let moderation = Some(Moderation { back_off: 0.0, optimum: answer.objective, is_attained: false });
-            design = finish(&problem, Moderated { answer, moderation }, &unknowns, None)?;
+            // from there the gain may be made smaller as from an optimum
+            let smaller = moderated(answer.clone())?;
+            design = match smaller.moderation.is_some() {
+                true => smaller,
+                false => {
+                    let moderation = Some(Moderation { back_off: 0.0, optimum: answer.objective, is_attained: false });
+                    finish(&problem, Moderated { answer, moderation }, &unknowns, None)?
+                }
+            };
         }
     }
     design.withdraw_infeasible(polytope);
