@@ -80,7 +80,7 @@ impl Problem {
                 gap = options.gap_tolerance.max(NEXT_GAP * gap);
             } else if broken.is_empty() {
                 answer.iterations = iterations;
-                return Ok(self.completed(answer, &posed));
+                return self.completed(answer, &posed);
             }
             // an objective that has become worse never comes back to what it was, so that nothing goes round in circles
             if has_moved && !broken.is_empty() {
@@ -129,7 +129,7 @@ impl Problem {
     }
 
     /// The answer as one of the whole problem: blocks that were not posed are proved, and have a multiplier of zero.
-    fn completed(&self, mut answer: Answer, posed: &[bool]) -> Answer {
+    fn completed(&self, mut answer: Answer, posed: &[bool]) -> Result<Answer, Error> {
         let nothing = |inequality: &Inequality| {
             let n = inequality.expression.nrows();
             Mat::zeros(n, n)
@@ -148,8 +148,7 @@ impl Problem {
             *witness = Witness { multipliers, smallest_eigenvalue, ..witness.clone() };
         }
         let mut own = std::mem::take(&mut answer.blocks).into_iter();
-        // the values are the problem's own, so that their sizes fit
-        let all = self.verify(&answer.values).unwrap_or_default();
+        let all = self.verify(&answer.values)?;
         answer.blocks = all
             .into_iter()
             .zip(posed)
@@ -174,7 +173,7 @@ impl Problem {
                 _ => Outcome::Inaccurate(InaccurateReason::NotVerified),
             };
         }
-        answer
+        Ok(answer)
     }
 }
 

@@ -152,6 +152,19 @@ struct Status {
 }
 
 impl Status {
+    /// An iteration as it begins, before its step is known.
+    fn begins(&self) -> IterationLog {
+        IterationLog {
+            objective: self.objective,
+            dual_objective: self.dual_objective,
+            residuals: self.residuals,
+            complementarity: self.mu,
+            centring: 0.0,
+            primal_step: 0.0,
+            dual_step: 0.0,
+        }
+    }
+
     /// At most 1 for a point that may be called solved.
     fn merit(&self, options: &Options) -> f64 {
         let Residuals { primal, dual, gap, uncertainty } = self.residuals;
@@ -216,15 +229,7 @@ fn iterate(program: &Program, objective: &[f64], options: &Options, started: Ins
             best = Some((merit, status));
             it.copy_point(&mut point);
         }
-        log.push(IterationLog {
-            objective: status.objective,
-            dual_objective: status.dual_objective,
-            residuals: status.residuals,
-            complementarity: status.mu,
-            centring: 0.0,
-            primal_step: 0.0,
-            dual_step: 0.0,
-        });
+        log.push(status.begins());
         let Residuals { primal, dual, gap, uncertainty } = status.residuals;
         if it.feasible && gap > BACK_OFF {
             copy(&it.x, interior.get_or_insert_default());

@@ -133,11 +133,9 @@ pub fn design_all(scenario: &mut Scenario) -> Result<(Vec<CheckedDesign>, Vec<Un
     }
     let designed: Vec<CheckedDesign> = finished.into_iter().map(|(_, checked)| checked).collect();
     // what is wrong with the file is said before anything is written
-    if designed.is_empty() || undesigned.iter().any(|undesigned| is_input(&undesigned.source)) {
-        undesigned.sort_by_key(|undesigned| !is_input(&undesigned.source));
-        if !undesigned.is_empty() {
-            return Err(undesigned.swap_remove(0).into());
-        }
+    let of_input = undesigned.iter().position(|undesigned| is_input(&undesigned.source));
+    if let Some(at) = of_input.or((designed.is_empty() && !undesigned.is_empty()).then_some(0)) {
+        return Err(undesigned.swap_remove(at).into());
     }
     let mut places = 0..;
     scenario.controllers.retain(|_| {

@@ -6,6 +6,7 @@ pub mod gain;
 mod model;
 mod objective;
 mod solve;
+mod source;
 mod transformed;
 mod verdict;
 

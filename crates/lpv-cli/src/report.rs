@@ -134,8 +134,7 @@ pub fn html(
     flights: &[Flown],
     folder: &Path,
 ) -> Result<String, Failure> {
-    let notes = notes(scenario, designs, undesigned, flights);
-    let report = Report { notes, ..report(scenario, designs, flights, folder) };
+    let report = report(scenario, designs, undesigned, flights, folder);
     let data = serde_json::to_string(&report).map_err(|error| Failure::serialisation(&error))?;
     if !PAGE.contains(PLACEHOLDER) {
         return Err(Failure::Defect("the report page has no place for its data".into()));
@@ -145,7 +144,13 @@ pub fn html(
     Ok(PAGE.replacen(PLACEHOLDER, &data.replace('<', "\\u003c"), 1))
 }
 
-fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a [Flown], folder: &Path) -> Report<'a> {
+fn report<'a>(
+    scenario: &'a Scenario,
+    designs: &'a [CheckedDesign],
+    undesigned: &[Undesigned],
+    flights: &'a [Flown],
+    folder: &Path,
+) -> Report<'a> {
     let description = scenario.plant.description();
     let samples = (scenario.duration_s / scenario.sample_time_s).round() as usize + 1;
     let shown: Vec<usize> = (0..samples).step_by(samples.div_ceil(SAMPLES)).collect();
@@ -193,7 +198,7 @@ fn report<'a>(scenario: &'a Scenario, designs: &'a [CheckedDesign], flights: &'a
             .map(|(set_point, label)| StepData { time_s: set_point.time_s, label })
             .collect(),
         runs,
-        notes: Vec::new(),
+        notes: notes(scenario, designs, undesigned, flights),
     }
 }
 

@@ -275,15 +275,7 @@ fn iterate(
         let against = (1.0 + it.objective_norm) / (1.0 + it.objective_norm + it.largest_multiplier());
         let Residuals { primal, dual, gap, uncertainty } = status.residuals;
         let dual = dual * against;
-        log.push(IterationLog {
-            objective: status.objective,
-            dual_objective: status.dual_objective,
-            residuals: status.residuals,
-            complementarity: status.mu,
-            centring: 0.0,
-            primal_step: 0.0,
-            dual_step: 0.0,
-        });
+        log.push(status.begins());
         sizes.push(it.x.norm());
         if it.feasible && gap > BACK_OFF {
             interior = Some(it.x.h.clone());

@@ -1,28 +1,14 @@
 //! The models of a problem: vertices as matrices, or linearisations of a plant.
 
 use super::file::{LyapunovName, Matrices, ModelTable};
+use super::source::Source;
 use super::transformed::tensor_product_models;
 use super::{convex_weights, matrix};
-use crate::certify::polytopic::Transformed;
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::file as scenario_file;
 use lpv::math::Mat;
-use lpv::model::{FrozenModel, GridModel, Polytope, linearize};
-use lpv::plant::Signal;
-
-/// The models of a file, before it is known what for.
-pub(super) struct Source {
-    pub models: Vec<FrozenModel>,
-    pub places: Vec<String>,
-    /// Of matrices: the polytope, of which the models may be points.
-    pub polytope: Option<Polytope>,
-    pub plant: Option<Box<dyn lpv::plant::Plant>>,
-    /// The states, where they have names.
-    pub states: Vec<Signal>,
-    /// Of a tensor-product model: where the vertices come from.
-    pub transformed: Option<Transformed>,
-}
+use lpv::model::{GridModel, Polytope, linearize};
 
 /// The models of the tables `[model]` and `[plant]`.
 pub(super) fn models(

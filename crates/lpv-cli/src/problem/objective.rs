@@ -1,7 +1,7 @@
 //! What a problem asks to be best, and from where: the objective and the initial state.
 
 use super::file::{DesignTable, LyapunovName, MethodName, ObjectiveName};
-use super::model::Source;
+use super::source::Source;
 use super::transformed::check_initial;
 use super::{Initial, convex_weights, matrix, state};
 use crate::failure::Failure;

@@ -1,6 +1,6 @@
 //! The model of a problem from a tensor-product model: the file of one, transformed here, or the JSON that `lpv tp` wrote.
 
-use super::model::Source;
+use super::source::Source;
 use crate::certify::polytopic::Transformed;
 use crate::failure::Failure;
 use crate::scenario::door::Door;

@@ -475,9 +475,15 @@ fn regulate(
             Err(_) => {}
         }
     }
+    let is_attained = is_regulator && answer.outcome.is_feasible();
+    let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
     let lqr =
         |i: usize| riccati::solve(polytope.a(i), polytope.b(i), &cost.q, &cost.r).ok().map(|regulator| regulator.k);
-    let reference: Vec<Mat<f64>> = (0..polytope.len()).map(lqr).collect::<Option<_>>().unwrap_or_default();
+    // the knee alone asks for it
+    let reference: Vec<Mat<f64>> = match back_off {
+        BackOff::Knee => (0..polytope.len()).map(lqr).collect::<Option<_>>().unwrap_or_default(),
+        _ => Vec::new(),
+    };
     let low_l: Vec<Expr> = auxiliary.clone().unwrap_or_else(|| unknowns.l.clone());
     let stage = Stage {
         problem: &problem,
@@ -490,8 +496,6 @@ fn regulate(
         ladder: &COST_LADDER,
         reference: &reference,
     };
-    let is_attained = is_regulator && answer.outcome.is_feasible();
-    let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
     let moderated = stage.moderate(answer, back_off, &solver())?;
     let mut design = finish(&problem, moderated, &unknowns, auxiliary.as_deref())?;
     design.withdraw_infeasible(polytope);
