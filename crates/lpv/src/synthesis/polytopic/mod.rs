@@ -22,6 +22,7 @@ mod objective;
 mod rates;
 mod separation;
 mod theorem;
+mod units;
 mod unstabilizable;
 
 pub use moderation::{BackOff, Moderation};
@@ -43,7 +44,8 @@ use crate::model::{FrozenModel, Polytope};
 use inequality::{DoubleSum, Unknowns, Weights};
 use lmi::{Answer, BlockReport, Carrier, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
 use moderation::{COST_LADDER, MARGIN_LADDER, Moderated, Stage};
-use objective::Posed;
+use objective::{COST_BOUND, MARGIN, Posed};
+use units::{Units, scaled};
 
 /// The Lyapunov function xᵀY(ρ)⁻¹x.
 #[derive(Clone, Debug, PartialEq)]
@@ -197,6 +199,18 @@ impl Solution {
 /// If sizes of weights, bounds, rates or objective do not fit the polytope; for a high gain of more than 10 inputs with a general R, or of
 /// more than 64.
 pub fn synthesize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
+    // an error is told in the problem's own units
+    if let Some(units) = Units::of(polytope, request)
+        && let Ok(design) = in_its_units(&units.polytope(polytope), &units.request(request))
+        && let Some(design) = restated(polytope, request, &units, design)
+    {
+        return Ok(design);
+    }
+    in_its_units(polytope, request)
+}
+
+/// The problem as it stands, whatever the size of its numbers.
+fn in_its_units(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
     match &request.weights {
         Some(weights) => regulate(polytope, request, weights, WhereStalled::Refute),
         None => stabilize(polytope, request),
@@ -221,25 +235,107 @@ fn solver() -> Options {
     Options { gap_tolerance: 1e-12, ..Options::default() }
 }
 
-/// Theorems 4.1 and 4.2: the largest t with every inequality ⪰ tI, where tr Yᵢ ≤ n fixes the scale.
-fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
-    let n = polytope.states();
-    let mut problem = Problem::new();
-    let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
-    let t = problem.scalar("margin");
-    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-    for (k, (name, block)) in sum.stability(&unknowns.l, &t).into_iter().enumerate() {
-        match sum.leads(k) {
-            true => problem.positive_definite_by(name, block, 0.0),
-            false => problem.positive_definite_lazily(name, block, Some(0.0), sum.family(k)),
+/// The design of a problem in its own `units` as one of the problem as it is stated; `None` where it is not solved, or not proved as stated.
+fn restated(
+    polytope: &Polytope,
+    request: &PolytopicRequest,
+    units: &Units,
+    design: PolytopicDesign,
+) -> Option<PolytopicDesign> {
+    let solution = design.solution.as_ref().filter(|_| design.is_solved())?;
+    let each = |of: &[Mat<f64>], factor: f64| of.iter().map(|matrix| scaled(matrix, factor)).collect::<Vec<_>>();
+    let mut restated = Solution {
+        y: each(&solution.y, units.y()),
+        l: each(&solution.l, units.l()),
+        p: each(&solution.p, 1.0 / units.y()),
+        gain: each(&solution.gain, units.gain()),
+        auxiliary_gain: solution.auxiliary_gain.as_ref().map(|gain| each(gain, units.gain())),
+        s: solution.s,
+        mixtures: Vec::new(),
+    };
+    let objective = units.objective(&request.objective);
+    let Some(cost) = &request.weights else {
+        let StabilityProblem { problem, .. } = StabilityProblem::new(polytope, request);
+        return Some(PolytopicDesign {
+            answer: problem.restated(&design.answer, &unknown_factors(&problem, units, objective), objective)?,
+            moderation: design.moderation.map(|moderation| moderation.times(objective)),
+            solution: Some(restated),
+            ..design
+        });
+    };
+    let weights = Weights::new(cost)?;
+    let posed = RegulatorProblem::new(polytope, request, cost, &weights);
+    let answer = match design.riccati {
+        // Y and L are not the solver's
+        Some(_) => {
+            let blocks = posed.problem.verify(&[restated.y[0].clone(), restated.l[0].clone()]).ok()?;
+            if !blocks.iter().all(|block| block.verified_lower_bound > 0.0) {
+                return None;
+            }
+            let mut answer = design.answer;
+            (answer.objective, answer.optimum_bound, answer.blocks) = (objective * answer.objective, None, blocks);
+            answer
         }
+        None => {
+            let factors = unknown_factors(&posed.problem, units, objective);
+            posed.problem.restated(&design.answer, &factors, objective)?
+        }
+    };
+    if let Some(s) = restated.s {
+        restated.mixtures = posed.mixtures(polytope, request, &weights, s, &answer);
     }
-    for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
-        problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
-        let trace = Expr::constant(Mat::from_fn(1, 1, |_, _| n as f64)) - y.trace();
-        problem.positive_definite_by(format!("scale of Y{}", i + 1), trace, 0.0);
+    Some(PolytopicDesign {
+        answer,
+        moderation: design.moderation.map(|moderation| moderation.times(objective)),
+        solution: Some(restated),
+        ..design
+    })
+}
+
+/// By how much each unknown of a problem is larger than in `units`: Y, L and M, and the scalar that is optimised.
+fn unknown_factors(problem: &Problem, units: &Units, objective: f64) -> Vec<f64> {
+    let factor = |name: &String| match name.as_str() {
+        MARGIN | COST_BOUND => objective,
+        name if name.starts_with('Y') => units.y(),
+        _ => units.l(),
+    };
+    problem.unknown_names().iter().map(factor).collect()
+}
+
+/// Theorems 4.1 and 4.2: the largest t with every inequality ⪰ tI, where tr Yᵢ ≤ n fixes the scale.
+struct StabilityProblem {
+    problem: Problem,
+    unknowns: Unknowns,
+    /// t
+    margin: Expr,
+}
+
+impl StabilityProblem {
+    fn new(polytope: &Polytope, request: &PolytopicRequest) -> Self {
+        let n = polytope.states();
+        let mut problem = Problem::new();
+        let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
+        let margin = problem.scalar(MARGIN);
+        let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
+        for (k, (name, block)) in sum.stability(&unknowns.l, &margin).into_iter().enumerate() {
+            match sum.leads(k) {
+                true => problem.positive_definite_by(name, block, 0.0),
+                false => problem.positive_definite_lazily(name, block, Some(0.0), sum.family(k)),
+            }
+        }
+        for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
+            problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
+            let trace = Expr::constant(Mat::from_fn(1, 1, |_, _| n as f64)) - y.trace();
+            problem.positive_definite_by(format!("scale of Y{}", i + 1), trace, 0.0);
+        }
+        problem.maximize(&margin);
+        Self { problem, unknowns, margin }
     }
-    problem.maximize(&t);
+}
+
+fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
+    let StabilityProblem { mut problem, unknowns, margin: t } = StabilityProblem::new(polytope, request);
+    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
     let terms = sum.stability_terms();
     let mut answer = problem.solve(&solver())?;
     if matches!(answer.outcome, Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_)) {
@@ -398,6 +494,90 @@ enum WhereStalled {
     Stop,
 }
 
+/// The inequalities of Theorems 2.1, 4.3, 4.4 and 5.1-5.4.
+struct RegulatorProblem {
+    problem: Problem,
+    unknowns: Unknowns,
+    /// Mᵢ, where mixtures of it with Lᵢ are inequalities: of a high gain with general R. With diagonal R the low gain L = M is optimal, and every K_s
+    /// satisfies the 2^m inequalities (`high_gain`).
+    auxiliary: Option<Vec<Expr>>,
+    objective: Posed,
+}
+
+impl RegulatorProblem {
+    fn new(polytope: &Polytope, request: &PolytopicRequest, cost: &CostWeights, weights: &Weights) -> Self {
+        let mut problem = Problem::new();
+        let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
+        let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
+        let auxiliary: Option<Vec<Expr>> = request.high_gain.filter(|_| !is_diagonal(&cost.r)).map(|_| {
+            let (m, n) = (polytope.inputs(), polytope.states());
+            (0..polytope.len()).map(|i| problem.rectangular(format!("M{}", i + 1), m, n)).collect()
+        });
+        let blocks = performance(&sum, auxiliary.as_deref(), &unknowns.l, weights);
+        for (k, (name, block)) in blocks.into_iter().enumerate() {
+            match sum.leads(k) {
+                true => problem.positive_definite(name, block),
+                false => problem.positive_definite_lazily(name, block, None, sum.family(k)),
+            }
+        }
+        for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
+            problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
+        }
+        if let Some(bounds) = &request.saturation {
+            for (name, block) in sum.unsaturated(auxiliary.as_ref().unwrap_or(&unknowns.l), bounds) {
+                problem.positive_definite(name, block);
+            }
+        }
+        let objective = request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
+        Self { problem, unknowns, auxiliary, objective }
+    }
+
+    /// Lᵢ of the gain that does not saturate.
+    fn low(&self) -> &[Expr] {
+        self.auxiliary.as_ref().unwrap_or(&self.unknowns.l)
+    }
+
+    /// Lᵢ of K_s, on the way from the low gain to R⁻¹BᵀP.
+    fn on_segment(&self, polytope: &Polytope, weights: &Weights, s: f64) -> Vec<Expr> {
+        let end = |i: usize| s * Expr::constant(&weights.r_inverse * polytope.b(i).transpose());
+        self.low().iter().enumerate().map(|(i, low)| (1.0 - s) * low + end(i)).collect()
+    }
+
+    /// Smallest eigenvalues of the performance inequality of mixtures of K_s and F at the vertices ([`Solution::mixtures`]).
+    fn mixtures(
+        &self,
+        polytope: &Polytope,
+        request: &PolytopicRequest,
+        weights: &Weights,
+        s: f64,
+        answer: &Answer,
+    ) -> Vec<(String, f64)> {
+        let sum = DoubleSum::new(polytope, &request.lyapunov, &self.unknowns.y);
+        let high = self.on_segment(polytope, weights, s);
+        listed_mixtures(polytope.inputs())
+            .into_iter()
+            .flat_map(|mixture| {
+                let rows = high.iter().zip(self.low());
+                let l: Vec<Expr> = rows.map(|(l, low)| super::high_gain::mixture(mixture, l, low)).collect();
+                let name = format!("mixture {mixture:0inputs$b}", inputs = polytope.inputs());
+                sum.performance_at_vertices(&name, &l, weights)
+            })
+            .map(|(name, block)| (name, smallest_eigenvalue(&answer.value(&block))))
+            .collect()
+    }
+}
+
+/// The performance inequalities of a gain `l`, or of every mixture of it with `low`.
+fn performance(sum: &DoubleSum, low: Option<&[Expr]>, l: &[Expr], weights: &Weights) -> Vec<(String, Expr)> {
+    let Some(low) = low else { return sum.performance("performance", l, weights) };
+    let inputs = l[0].nrows();
+    let of_mixture = |vertex: usize| {
+        let mixed: Vec<Expr> = l.iter().zip(low).map(|(l, m)| super::high_gain::mixture(vertex, l, m)).collect();
+        sum.performance(&format!("performance of mixture {vertex:0inputs$b}"), &mixed, weights)
+    };
+    (0..1usize << inputs).flat_map(of_mixture).collect()
+}
+
 /// Theorems 2.1, 4.3, 4.4, 5.1-5.4.
 ///
 /// Whatever the weights and bounds, there is a solution if and only if the system can be stabilised by the same Lyapunov function:
@@ -411,39 +591,8 @@ fn regulate(
     where_stalled: WhereStalled,
 ) -> Result<PolytopicDesign, SynthesisError> {
     let weights = Weights::new(cost).expect("weights are checked to be semidefinite and definite");
-    let mut problem = Problem::new();
-    let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
-    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-    // with diagonal R the low gain L = M is optimal, and every K_s satisfies the 2^m inequalities (`high_gain`)
-    let mixtures = request.high_gain.filter(|_| !is_diagonal(&cost.r));
-    let auxiliary: Option<Vec<Expr>> = mixtures.map(|_| {
-        let (m, n) = (polytope.inputs(), polytope.states());
-        (0..polytope.len()).map(|i| problem.rectangular(format!("M{}", i + 1), m, n)).collect()
-    });
-    let performance = |l: &[Expr]| -> Vec<(String, Expr)> {
-        let Some(low) = &auxiliary else { return sum.performance("performance", l, &weights) };
-        let inputs = polytope.inputs();
-        let of_mixture = |vertex: usize| {
-            let mixed: Vec<Expr> = l.iter().zip(low).map(|(l, m)| super::high_gain::mixture(vertex, l, m)).collect();
-            sum.performance(&format!("performance of mixture {vertex:0inputs$b}"), &mixed, &weights)
-        };
-        (0..1usize << inputs).flat_map(of_mixture).collect()
-    };
-    for (k, (name, block)) in performance(&unknowns.l).into_iter().enumerate() {
-        match sum.leads(k) {
-            true => problem.positive_definite(name, block),
-            false => problem.positive_definite_lazily(name, block, None, sum.family(k)),
-        }
-    }
-    for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
-        problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
-    }
-    if let Some(bounds) = &request.saturation {
-        for (name, block) in sum.unsaturated(auxiliary.as_ref().unwrap_or(&unknowns.l), bounds) {
-            problem.positive_definite(name, block);
-        }
-    }
-    let objective = request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
+    let posed = RegulatorProblem::new(polytope, request, cost, &weights);
+    let RegulatorProblem { problem, unknowns, auxiliary, objective } = &posed;
     let answer = problem.solve(&solver())?;
     let mut seems_unstabilizable = None;
     let contradicts = matches!(answer.outcome, Outcome::Infeasible(_) | Outcome::InfeasibleWithin(_));
@@ -462,7 +611,7 @@ fn regulate(
     if is_riccati {
         match riccati::solve(polytope.a(0), polytope.b(0), &cost.q, &cost.r) {
             Ok(regulator) => {
-                if let Some(design) = by_riccati(polytope, cost, &problem, &answer, &regulator)? {
+                if let Some(design) = by_riccati(polytope, cost, problem, &answer, &regulator)? {
                     return Ok(design);
                 }
             }
@@ -484,12 +633,11 @@ fn regulate(
         BackOff::Knee => (0..polytope.len()).map(lqr).collect::<Option<_>>().unwrap_or_default(),
         _ => Vec::new(),
     };
-    let low_l: Vec<Expr> = auxiliary.clone().unwrap_or_else(|| unknowns.l.clone());
     let stage = Stage {
-        problem: &problem,
-        objective: &objective,
+        problem,
+        objective,
         least: f64::NEG_INFINITY,
-        l: &low_l,
+        l: posed.low(),
         y: &unknowns.y,
         r_inverse: &weights.r_inverse,
         q: inverse_spd(&cost.q).map(|_| &cost.q),
@@ -497,20 +645,18 @@ fn regulate(
         reference: &reference,
     };
     let moderated = stage.moderate(answer, back_off, &solver())?;
-    let mut design = finish(&problem, moderated, &unknowns, auxiliary.as_deref())?;
+    let mut design = finish(problem, moderated, unknowns, auxiliary.as_deref())?;
     design.withdraw_infeasible(polytope);
     (design.undetectable, design.unstabilizable) = (undetectable, seems_unstabilizable);
     let (Some(solution), Some(high_gain)) = (&mut design.solution, request.high_gain) else { return Ok(design) };
     let low = solution.auxiliary_gain.take().unwrap_or_else(|| solution.gain.clone());
     let mut s = choose(polytope, cost, &solution.p, &low, &high_gain)?;
     // with a general R the inequalities decide; s = 0 satisfies them, so halving ends
-    let on_segment = |s: f64| -> Vec<Expr> {
-        let end = |i: usize| s * Expr::constant(&weights.r_inverse * polytope.b(i).transpose());
-        low_l.iter().enumerate().map(|(i, low)| (1.0 - s) * low + end(i)).collect()
-    };
-    if mixtures.is_some() {
+    if auxiliary.is_some() {
+        let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
         let holds = |s: f64| {
-            let blocks = performance(&on_segment(s));
+            let l = posed.on_segment(polytope, &weights, s);
+            let blocks = performance(&sum, auxiliary.as_deref(), &l, &weights);
             blocks.iter().all(|(_, block)| inverse_spd(&design.answer.value(block)).is_some())
         };
         let mut halvings = 0;
@@ -519,20 +665,12 @@ fn regulate(
             halvings += 1;
         }
     }
-    solution.l = on_segment(s).iter().map(|l| design.answer.value(l)).collect();
+    let high = posed.on_segment(polytope, &weights, s);
+    solution.l = high.iter().map(|l| design.answer.value(l)).collect();
     solution.gain = solution.l.iter().zip(&solution.p).map(|(l, p)| l * p).collect();
     solution.auxiliary_gain = Some(low);
     solution.s = Some(s);
-    solution.mixtures = listed_mixtures(polytope.inputs())
-        .into_iter()
-        .flat_map(|mixture| {
-            let l: Vec<Expr> =
-                on_segment(s).iter().zip(&low_l).map(|(l, low)| super::high_gain::mixture(mixture, l, low)).collect();
-            let name = format!("mixture {mixture:0inputs$b}", inputs = polytope.inputs());
-            sum.performance_at_vertices(&name, &l, &weights)
-        })
-        .map(|(name, block)| (name, smallest_eigenvalue(&design.answer.value(&block))))
-        .collect();
+    solution.mixtures = posed.mixtures(polytope, request, &weights, s, &design.answer);
     Ok(design)
 }
 

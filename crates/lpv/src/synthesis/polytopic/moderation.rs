@@ -19,7 +19,7 @@
 //! W(P) = P(A − BK) + (A − BK)ᵀP + Q + KᵀRK ⪯ 0, W((1 + ε)P) = (1 + ε)W(P) − ε(Q + KᵀRK), and |kx| ≤ σ on V ≤ γ becomes strict, which
 //! pays for the rounding of K and P: by that of P alone kP⁻¹kᵀ moves by a share of cond(P) units in the last place. ε is a part of β.
 
-use super::objective::Posed;
+use super::objective::{COST_BOUND, MARGIN, Posed};
 use crate::math::Mat;
 use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::matrix::{inverse_spd, semidefinite_factor};
@@ -49,6 +49,13 @@ pub struct Moderation {
     pub is_attained: bool,
 }
 
+impl Moderation {
+    /// Of an objective that is `factor` times as large.
+    pub(super) fn times(self, factor: f64) -> Self {
+        Self { optimum: factor * self.optimum, ..self }
+    }
+}
+
 /// Shares of a cost that are tried, ascending.
 pub(super) const COST_LADDER: [f64; 4] = [1e-3, 1e-2, 5e-2, 1e-1];
 /// Shares of a margin of stability, which costs nobody anything.
@@ -61,6 +68,9 @@ const LARGE_GAIN: f64 = 1e3;
 const EFFORT_ROOM: f64 = 4.0;
 /// ε of the strictness that is paid for rounding, as a share of what is given back, and at least.
 const STRICTNESS: (f64, f64) = (0.02, 1e-6);
+
+/// ε of an optimum of which nothing is given back.
+const LEAST_STRICTNESS: f64 = 1e-7;
 
 fn strictness(share: f64) -> f64 {
     (STRICTNESS.0 * share).max(STRICTNESS.1)
@@ -137,7 +147,8 @@ impl Stage<'_> {
         let enough = KNEE * self.effort(&most, &most).max(self.effort_of(self.reference, &most));
         if back_off == BackOff::Knee {
             if is_attained && self.effort(&answer, &most) <= enough {
-                return Ok(moderated(0.0, answer));
+                let strict = self.problem.moved(&answer, self.strict(&answer, LEAST_STRICTNESS));
+                return Ok(moderated(0.0, strict.unwrap_or(answer)));
             }
             for &share in &ladder[..smaller] {
                 let second = self.second(&answer, share, &mut begun, options)?;
@@ -166,16 +177,18 @@ impl Stage<'_> {
         Ok(points.iter().filter(has_point).find_map(moved))
     }
 
-    /// The unknowns of the first stage at a point of the second, (Y, L)/(1 + ε), and t(1 + ε) of a cost bound.
+    /// The unknowns of the first stage at a point of the second: (Y, L)/(1 + ε), t(1 + ε) of a cost bound, and t/(1 + ε)² of a margin of stability.
     fn strict(&self, point: &Answer, epsilon: f64) -> Vec<Mat<f64>> {
-        let count = self.problem.unknown_names().len();
-        let scaled = |(i, value): (usize, &Mat<f64>)| {
-            // a bound is the last of the unknowns
-            let is_bound = !self.objective.is_maximised && i + 1 == count;
-            let factor = if is_bound { 1.0 + epsilon } else { 1.0 / (1.0 + epsilon) };
+        let names = self.problem.unknown_names();
+        let scaled = |(name, value): (&String, &Mat<f64>)| {
+            let factor = match name.as_str() {
+                COST_BOUND => 1.0 + epsilon,
+                MARGIN => (1.0 + epsilon).powi(-2),
+                _ => 1.0 / (1.0 + epsilon),
+            };
             Mat::from_fn(value.nrows(), value.ncols(), |i, j| factor * value[(i, j)])
         };
-        point.unknown_values()[..count].iter().enumerate().map(scaled).collect()
+        names.iter().zip(point.unknown_values()).map(scaled).collect()
     }
 
     /// Points of least effort with the share `share` of `optimum` given back, the better conditioned first, with the unknowns of the second
@@ -193,8 +206,11 @@ impl Stage<'_> {
         let sign = self.objective.sign();
         // so that what is made strict still is within the share
         let epsilon = strictness(share);
-        let given = ((share - epsilon) / (1.0 + epsilon)).max(0.0);
-        let least = one(sign * optimum - given * optimum.abs());
+        let given = match self.problem.unknown_names().iter().any(|name| name == MARGIN) {
+            true => 1.0 - (1.0 - share) * (1.0 + epsilon).powi(2),
+            false => (share - epsilon) / (1.0 + epsilon),
+        };
+        let least = one(sign * optimum - given.max(0.0) * optimum.abs());
         problem.positive_definite_by("what is left of the optimum", sign * &self.objective.value - least, 0.0);
         for (i, (l, y)) in self.l.iter().zip(self.y).enumerate() {
             let block = Expr::symmetric_blocks(vec![vec![tau.times(self.r_inverse)], vec![l.t(), y.clone()]]);

@@ -23,6 +23,11 @@ pub enum Objective {
     },
 }
 
+/// Name of the margin of stability t.
+pub(super) const MARGIN: &str = "margin";
+/// Name of the bound t.
+pub(super) const COST_BOUND: &str = "cost bound";
+
 /// An objective of a problem.
 pub(super) struct Posed {
     /// A scalar.
@@ -57,7 +62,7 @@ impl Objective {
                     }
                     _ => distinct.iter().map(|y| (*y).clone()).collect(),
                 };
-                let t = problem.scalar("cost bound");
+                let t = problem.scalar(COST_BOUND);
                 for (k, state) in states.iter().enumerate() {
                     let column = Expr::constant(Mat::from_fn(n, 1, |i, _| state[i]));
                     for (i, y) in at.iter().enumerate() {
@@ -71,7 +76,7 @@ impl Objective {
             }
             Objective::Ellipsoid { shape } => {
                 let n = vertices[0].nrows();
-                let t = problem.scalar("cost bound");
+                let t = problem.scalar(COST_BOUND);
                 for (i, y) in distinct.iter().enumerate() {
                     let block =
                         Expr::symmetric_blocks(vec![vec![t.times(shape)], vec![Expr::identity(n), (*y).clone()]]);
