@@ -62,6 +62,7 @@ const SHIPPED: [Shipped; 9] = [
 /// that one can apply; and the nonlinear plant, in Runge–Kutta steps, settles as the table of docs/tensor_product.md says (U = 20 m/s).
 #[test]
 fn shipped_problems_are_proved_for_the_model_and_the_plant() {
+    let mut slower = Vec::new();
     for (problem, [model, name], largest_gain, start, [duration_s, settled_s, peak]) in SHIPPED {
         let place = place(problem, model);
         place.succeed("design scenario.toml -o design.json");
@@ -76,13 +77,11 @@ fn shipped_problems_are_proved_for_the_model_and_the_plant() {
             assert_eq!(verdict(&certificate, id), "proved", "{problem}: {id}");
         }
         let flown = fly(&design, name, start, duration_s);
-        assert!(
-            flown[0] <= settled_s && flown[1] <= peak,
-            "{problem}: settles in {} s, |u| up to {}",
-            flown[0],
-            flown[1]
-        );
+        if flown[0] > settled_s || flown[1] > peak {
+            slower.push(format!("{problem}: settles in {} s, |u| up to {}", flown[0], flown[1]));
+        }
     }
+    assert!(slower.is_empty(), "{slower:#?}");
 }
 
 /// When ‖x‖ falls below 2 % of the start for good, and the largest |u|.
