@@ -252,15 +252,16 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     }
     let solved = answer.outcome.is_optimal();
     let moderated = |answer: Answer| -> Result<PolytopicDesign, SynthesisError> {
-        let identity = Mat::identity(polytope.inputs(), polytope.inputs());
+        let r_inverse = input_units(polytope);
+        let identity = Mat::identity(n, n);
         let stage = Stage {
             problem: &problem,
             objective: &Posed { value: t.clone(), is_maximised: true },
             least: LEAST_MARGIN,
             l: &unknowns.l,
             y: &unknowns.y,
-            r_inverse: &identity,
-            q: None,
+            r_inverse: &r_inverse,
+            q: Some(&identity),
             ladder: &MARGIN_LADDER,
             reference: &[],
         };
@@ -324,6 +325,16 @@ fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<Polytopi
     design.withdraw_infeasible(polytope);
     design.unstabilizable = point;
     Ok(design)
+}
+
+/// R⁻¹ of an effort that knows no units of the inputs: uᵀRu = Σⱼ ‖bⱼ‖²uⱼ², with the largest column bⱼ of all vertices; 1 for an input that moves nothing.
+fn input_units(polytope: &Polytope) -> Mat<f64> {
+    let largest = |j: usize| {
+        let columns = (0..polytope.len()).map(|i| polytope.b(i).col(j).norm_l2());
+        columns.fold(0.0, f64::max)
+    };
+    let entry = |j: usize| Some(largest(j).powi(-2)).filter(|inverse| inverse.is_normal()).unwrap_or(1.0);
+    Mat::from_fn(polytope.inputs(), polytope.inputs(), |i, j| if i == j { entry(j) } else { 0.0 })
 }
 
 /// Y and L of a regulator with Q = I and R = I, which stabilises too, for where the largest margin is too small for the solver: scaled to

@@ -13,7 +13,8 @@
 //!
 //! uᵀRu ≤ τV and V ≤ ν xᵀQx, so that τν bounds the gain itself, uᵀRu/xᵀQx; where that is large, the least ν is taken with a little more than
 //! the least τ: P ⪯ νQ. Both sides are quadratic in x, so that the measure has no unit of its own: it is the same for every scale of states, inputs and
-//! time. Of a high gain it is the low gain F that is kept small; K is then the chosen share of the way to R⁻¹BᵀP.
+//! time. Of stabilisation, which has no cost, Q is the I that its margin is measured by, and R weighs every input by the square of its column of B, so that the unit of an
+//! input does not matter. Of a high gain it is the low gain F that is kept small; K is then the chosen share of the way to R⁻¹BᵀP.
 //!
 //! At its optimum the second problem rests on its boundary as the first does. What is returned is (Y, L)/(1 + ε): for
 //! W(P) = P(A − BK) + (A − BK)ᵀP + Q + KᵀRK ⪯ 0, W((1 + ε)P) = (1 + ε)W(P) − ε(Q + KᵀRK), and |kx| ≤ σ on V ≤ γ becomes strict, which
@@ -80,7 +81,7 @@ pub(super) struct Stage<'a> {
     pub y: &'a [Expr],
     /// R⁻¹ ≻ 0
     pub r_inverse: &'a Mat<f64>,
-    /// Q, where there is one and it is definite.
+    /// Q, where it is definite.
     pub q: Option<&'a Mat<f64>>,
     /// The shares that are tried, ascending.
     pub ladder: &'a [f64],
