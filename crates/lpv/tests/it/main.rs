@@ -19,3 +19,4 @@ mod sampled_cost;
 mod scheduled;
 mod synthesis;
 mod tensor_product;
+mod trade_off;
