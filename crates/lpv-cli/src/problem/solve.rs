@@ -579,7 +579,7 @@ impl Report {
         let place = self.place.as_ref().map_or(String::new(), |place| format!(" at {place}"));
         let message = format!("{}: {}{place}: {}", path.display(), self.status, self.verdict_reason);
         match self.status {
-            SOLVED => None,
+            SOLVED => (self.verdict < Verdict::Numerical).then_some(Failure::NotCertified(message)),
             "infeasible" | "unbounded" => Some(Failure::NoOptimum(message + &self.relaxation())),
             INACCURATE => Some(Failure::NotCertified(message)),
             _ => Some(Failure::NotCertified(message + &self.relaxation())),
