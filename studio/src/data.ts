@@ -115,6 +115,8 @@ export interface Run {
   claims: Claim[];
   /** What proves the claims about the design again, for a shell. */
   certify_command: string;
+  /** Largest singular value of the gains that fly, over the grid points and the sets of a family. */
+  largest_gain: number;
   /** The largest rate of the parameter for which set and cost bound are proved, 0 at rest; null where they are not. */
   proved_rate: number | null;
   outcome: Outcome;
@@ -320,7 +322,7 @@ function checkRun(check: Checker, value: unknown, path: string, size: Sizes): vo
   const run = check.dict(value, path);
   if (!run) return;
   for (const key of ["id", "label", "controller", "certify_command", "guaranteed_cost_note"]) check.text(run[key], `${path}.${key}`);
-  for (const key of ["color_index", "peak_input", "saturated_share"]) check.number(run[key], `${path}.${key}`);
+  for (const key of ["color_index", "largest_gain", "peak_input", "saturated_share"]) check.number(run[key], `${path}.${key}`);
   for (const key of ["guaranteed_cost", "plant_cost_bound", "model_cost_bound", "actual_cost", "settling_time_s", "proved_rate"]) check.numberOrNull(run[key], `${path}.${key}`);
   check.verdict(run.verdict, `${path}.verdict`);
   check.verdict(run.guaranteed_cost_verdict, `${path}.guaranteed_cost_verdict`);

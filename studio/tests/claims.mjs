@@ -63,5 +63,5 @@ function steps(verdict) {
 export function claimsOf(run) {
   const claims = { proved, refuted, undecided: halfProved, numerical: checked }[run.verdict]();
   const flight = run.verdict === "refuted" ? [] : steps(run.verdict);
-  return { claims: [...claims, ...flight], certify_command: `lpv certify out/quadrotor/design-${run.id}.json`, proved_rate: run.verdict === "proved" ? RATE : null };
+  return { claims: [...claims, ...flight], certify_command: `lpv certify out/quadrotor/design-${run.id}.json`, largest_gain: 31.6, proved_rate: run.verdict === "proved" ? RATE : null };
 }

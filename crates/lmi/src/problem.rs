@@ -225,19 +225,10 @@ impl Problem {
         Some(Answer { outcome, blocks, objective, gap, optimum_bound, attained, residuals, values, ..answer })
     }
 
-    /// The answer to this problem by that to the same one stated in other units: unknown i here is `unknowns[i]` times what it is there, and the objective
-    /// `objective` times; `None` where these values are not proved to satisfy the inequalities as they are stated here. What was proved of the data there is
-    /// not carried over: there is no bound on the optimum, and there are no multipliers.
-    ///
-    /// # Panics
-    ///
-    /// When the factors do not match the unknowns in number, or those not the answer's.
-    pub fn restated(&self, answer: &Answer, unknowns: &[f64], objective: f64) -> Option<Answer> {
-        assert_eq!(unknowns.len(), self.unknowns.len(), "one factor for each unknown");
-        let scaled = |(value, &factor): (&Mat<f64>, &f64)| {
-            Mat::from_fn(value.nrows(), value.ncols(), |i, j| factor * value[(i, j)])
-        };
-        let values: Vec<Mat<f64>> = answer.values.iter().zip(unknowns).map(scaled).collect();
+    /// The answer to this problem by that to the same one stated in other units: `values` are those of the answer in the units here, and the objective here
+    /// is `objective` times as large; `None` where the values are not proved to satisfy the inequalities as they are stated here. What was proved of
+    /// the data there is not carried over: there is no bound on the optimum, and there are no multipliers.
+    pub fn restated(&self, answer: &Answer, values: Vec<Mat<f64>>, objective: f64) -> Option<Answer> {
         let blocks = self.verify(&values).ok()?;
         let outcome = match answer.outcome {
             Outcome::Solved | Outcome::SolvedToTolerance(_) => {

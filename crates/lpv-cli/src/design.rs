@@ -4,7 +4,7 @@ use crate::designs::{self, DesignSummary, Undesigned};
 use crate::failure::Failure;
 use crate::folder::{ResultFile, ResultFolder};
 use crate::output::{OutputArguments, print};
-use crate::problem::{ProblemPlan, gain, solve};
+use crate::problem::{ProblemPlan, gain, solve, solve_with_trade_off, trade_off};
 use crate::run::outcome;
 use crate::scenario::{Scenario, read_text};
 use clap::Args;
@@ -16,6 +16,9 @@ use std::path::PathBuf;
 pub struct DesignArguments {
     /// Problem file (with a [design] table), or scenario file
     file: PathBuf,
+    /// Draw what each share of the optimum that is given back buys, gain against optimum, to FILE.svg; with a table
+    #[arg(long, value_name = "FILE.svg")]
+    trade_off: Option<PathBuf>,
     #[command(flatten)]
     output: OutputArguments,
 }
@@ -23,6 +26,10 @@ pub struct DesignArguments {
 /// Solve the problem, or design every controller of the scenario.
 pub fn run(arguments: &DesignArguments) -> Result<(), Failure> {
     let text = read_text(&arguments.file)?;
+    let is_curve = ProblemPlan::is_problem(&text) && !gain::is_gain(&text);
+    if arguments.trade_off.is_some() && !is_curve {
+        return trade_off::refuse(&arguments.file, "is for a problem with a design over models or a polytope");
+    }
     match ProblemPlan::is_problem(&text) {
         true if gain::is_gain(&text) => run_gain(arguments, &text),
         true => run_problem(arguments, &text),
@@ -35,7 +42,21 @@ fn run_problem(arguments: &DesignArguments, text: &str) -> Result<(), Failure> {
     let plan = ProblemPlan::read(&arguments.file, text)?;
     let place =
         arguments.output.out.as_deref().map(|place| ResultFile::begin(place, arguments.output.force)).transpose()?;
-    let report = solve(&plan, &arguments.file)?;
+    let picture = match &arguments.trade_off {
+        Some(place) => {
+            trade_off::check(&plan, &arguments.file)?;
+            Some(ResultFile::begin_for("--trade-off", place, arguments.output.force)?)
+        }
+        None => None,
+    };
+    let report = match picture {
+        Some(_) => solve_with_trade_off(&plan, &arguments.file)?,
+        None => solve(&plan, &arguments.file)?,
+    };
+    if let (Some(picture), Some(curve)) = (picture, &report.trade_off) {
+        let title = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
+        picture.finish(curve.figure(&title).svg(true).as_bytes())?;
+    }
     let json = serde_json::to_string_pretty(&report).map_err(|error| Failure::serialisation(&error))?;
     if let Some(place) = place {
         place.finish(json.as_bytes())?;

@@ -118,22 +118,32 @@ pub struct ResultFile {
     place: PathBuf,
 }
 
+/// The option that names a result file.
+const OUT: &str = "--out";
+
 impl ResultFile {
     /// Begin the file that is to stand at `place`.
     ///
     /// # Errors
     /// Something stands there and `replace` is not set, or it is no file, or its folder is not there.
     pub fn begin(place: &Path, replace: bool) -> Result<Self, Failure> {
-        let refuse = |message: &str| Err(Failure::Output { path: place.to_owned(), message: message.into() });
+        Self::begin_for(OUT, place, replace)
+    }
+
+    /// As [`begin`](Self::begin), for the option `option`.
+    pub fn begin_for(option: &str, place: &Path, replace: bool) -> Result<Self, Failure> {
+        let refuse = |message: String| Err(Failure::Output { path: place.to_owned(), message });
         if place.is_dir() || place.file_name().is_none() {
-            return refuse("is a folder; give --out a file name");
+            return refuse(format!("is a folder; give {option} a file name"));
         }
         if place.exists() && !replace {
-            return refuse("is there already; give --force to replace it, or --out another file");
+            return refuse(format!("is there already; give --force to replace it, or {option} another file"));
         }
         let folder = place.parent().filter(|parent| !parent.as_os_str().is_empty());
         if folder.is_some_and(|folder| !folder.is_dir()) {
-            return refuse("cannot be written: its folder is not there; create it, or give --out another file");
+            return refuse(format!(
+                "cannot be written: its folder is not there; create it, or give {option} another file"
+            ));
         }
         Ok(Self { place: place.to_owned() })
     }

@@ -7,6 +7,8 @@ mod model;
 mod objective;
 mod solve;
 mod source;
+mod stages;
+pub mod trade_off;
 mod transformed;
 mod verdict;
 
@@ -22,7 +24,7 @@ use lpv::synthesis::polytopic::{BackOff, HighGain, InputBounds, Lyapunov, Object
 use lpv::synthesis::{CostWeights, HighGainOptions};
 use model::models;
 use objective::{initial, objective};
-pub use solve::solve;
+pub use solve::{SOLVED, solve, solve_with_trade_off};
 use std::path::Path;
 
 /// Vertices of a polytope; each pair of them is an inequality for each rate vertex.

@@ -2,6 +2,7 @@
 //! from elsewhere.
 
 use crate::failure::Failure;
+use crate::problem::SOLVED;
 use crate::scenario::door::Door;
 use crate::scenario::engineers_words;
 use lpv::certificate::{
@@ -37,6 +38,9 @@ struct PolytopicFile {
     sigma: Option<Vec<Option<f64>>>,
     gamma: Option<f64>,
     rate_vertices: Option<Vec<Vec<f64>>>,
+    /// How `lpv design` ended, and why: it writes files without a design, too.
+    status: Option<String>,
+    verdict_reason: Option<String>,
     #[serde(rename = "K")]
     k: Option<Matrices>,
     #[serde(rename = "P")]
@@ -130,6 +134,9 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
         file: door.file.to_owned(),
         message: format!("is not a design over a polytope: {}", engineers_words(&error.to_string())),
     })?;
+    if let Some(failure) = without_design(door, &file) {
+        return Err(failure);
+    }
     let (a, b) = (all(door, "model.A", &file.model.a)?, all(door, "model.B", &file.model.b)?);
     let polytope = Polytope::new(a, b).or_else(|error| door.refuse("model", error.to_string()))?;
     let fingerprint = polytope.fingerprint();
@@ -253,6 +260,26 @@ pub fn claims(door: &Door, text: &str, region: Option<f64>, record: &mut Record)
             Ok(each.into_iter().flatten().collect())
         }
     }
+}
+
+/// What the file says where it is an answer without a design. The words are those of the file, and nothing of them is proved again here.
+fn without_design(door: &Door, file: &PolytopicFile) -> Option<Failure> {
+    let status = file.status.as_deref().filter(|&status| status != SOLVED)?;
+    if file.k.is_some() || file.p.is_some() || file.y.is_some() {
+        return None;
+    }
+    // one line, whatever a file holds
+    let line = |text: &str| text.replace(char::is_control, " ");
+    let reason = file.verdict_reason.as_deref().map_or(String::new(), |reason| format!(": {}", line(reason)));
+    let message = format!(
+        "{}: holds no design, there is nothing to certify: lpv design ended with \"{}\"{reason}",
+        door.file.display(),
+        line(status)
+    );
+    Some(match status {
+        "infeasible" | "unbounded" => Failure::NoOptimum(message),
+        _ => Failure::NotCertified(message),
+    })
 }
 
 fn all(door: &Door, key: &str, given: &Matrices) -> Result<Vec<Mat<f64>>, Failure> {

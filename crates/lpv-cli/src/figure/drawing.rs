@@ -1,6 +1,6 @@
 //! From a figure to its drawing.
 
-use super::axis::{span, tick_labels, ticks};
+use super::axis::span;
 use super::curve::simplify;
 use super::{Dash, Figure, Mark, Panel, STYLE, Style};
 use std::fmt::Write;
@@ -42,13 +42,16 @@ pub(super) fn draw(figure: &Figure, alone: bool) -> String {
     let (legend, legend_height) = legend(&figure.legend);
     let total = legend_height + rows as f64 * (TOP + height + BOTTOM);
     let id = figure.number.replace('.', "-");
+    let heading = match figure.number {
+        "" => figure.title.clone(),
+        number => format!("Figure {number}: {}", figure.title),
+    };
 
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"figure-drawing\" viewBox=\"0 0 {WIDTH} {total}\" width=\"{WIDTH}\" \
-         height=\"{total}\" role=\"img\" aria-labelledby=\"title-{id} description-{id}\">\n<title id=\"title-{id}\">Figure {}: {}</title>\n\
+         height=\"{total}\" role=\"img\" aria-labelledby=\"title-{id} description-{id}\">\n<title id=\"title-{id}\">{}</title>\n\
          <desc id=\"description-{id}\">{}</desc>\n",
-        figure.number,
-        plain(&figure.title),
+        plain(&heading),
         plain(&figure.caption)
     );
     if alone {
@@ -88,18 +91,16 @@ fn draw_panel(svg: &mut String, panel: &Panel, frame: &Frame, clip: &str) {
         svg,
         "<clipPath id=\"{clip}\"><rect x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
     );
-    let x_ticks = ticks(frame.x, (width / 75.0) as usize);
-    let y_ticks = ticks(frame.y, (height / 30.0).max(3.0) as usize);
-    for (tick, label) in x_ticks.iter().zip(tick_labels(&x_ticks)) {
-        let x = round(frame.at([*tick, frame.y[0]])[0]);
+    for (tick, label) in panel.x.ticks(frame.x, (width / 75.0) as usize) {
+        let x = round(frame.at([tick, frame.y[0]])[0]);
         let _ = writeln!(
             svg,
             "<path class=\"grid\" d=\"M{x} {top}V{bottom}\"/><text class=\"tick\" text-anchor=\"middle\" x=\"{x}\" y=\"{}\">{label}</text>",
             bottom + 15.0
         );
     }
-    for (tick, label) in y_ticks.iter().zip(tick_labels(&y_ticks)) {
-        let y = round(frame.at([frame.x[0], *tick])[1]);
+    for (tick, label) in panel.y.ticks(frame.y, (height / 30.0).max(3.0) as usize) {
+        let y = round(frame.at([frame.x[0], tick])[1]);
         let _ = writeln!(
             svg,
             "<path class=\"grid\" d=\"M{left} {y}H{right}\"/><text class=\"tick\" text-anchor=\"end\" x=\"{}\" y=\"{}\">{label}</text>",
@@ -115,6 +116,10 @@ fn draw_panel(svg: &mut String, panel: &Panel, frame: &Frame, clip: &str) {
     for (point, label) in &panel.labels {
         let [x, y] = frame.at(*point).map(round);
         let _ = writeln!(svg, "<text text-anchor=\"middle\" x=\"{x}\" y=\"{}\">{}</text>", y + 4.0, markup(label));
+    }
+    for (point, label) in &panel.notes {
+        let [x, y] = frame.at(*point).map(round);
+        let _ = writeln!(svg, "<text class=\"tick\" x=\"{}\" y=\"{}\">{}</text>", x + 11.0, y + 4.0, markup(label));
     }
     let _ = writeln!(
         svg,
@@ -148,9 +153,9 @@ fn draw_mark(svg: &mut String, mark: &Mark, frame: &Frame) {
     let mut path = String::new();
     for piece in mark.points.split(|point| !(point[0].is_finite() && point[1].is_finite())) {
         let piece = pixels(piece);
-        if mark.style.dash == Dash::Dots {
+        if let Some(sign) = sign(mark.style.dash) {
             for [x, y] in piece {
-                let _ = write!(path, "M{:.1} {:.1}h0", x, y);
+                let _ = write!(path, "M{:.1} {:.1}{sign}", x, y);
             }
             continue;
         }
@@ -164,6 +169,16 @@ fn draw_mark(svg: &mut String, mark: &Mark, frame: &Frame) {
     let _ = writeln!(svg, "<path class=\"{classes}\" d=\"{path}\"/>");
 }
 
+/// The path of a mark from its middle, of those that are no lines.
+fn sign(dash: Dash) -> Option<&'static str> {
+    match dash {
+        Dash::Dots => Some("h0"),
+        Dash::Crosses => Some("m-4 -4l8 8m-8 0l8 -8"),
+        Dash::Rings => Some("m-7 0a7 7 0 1 0 14 0a7 7 0 1 0 -14 0"),
+        Dash::Solid | Dash::Dashed | Dash::Chain | Dash::Dotted | Dash::Fill => None,
+    }
+}
+
 fn classes(style: Style) -> String {
     let kind = match style.dash {
         Dash::Solid => "curve",
@@ -172,6 +187,7 @@ fn classes(style: Style) -> String {
         Dash::Dotted => "curve dotted",
         Dash::Fill => "fill",
         Dash::Dots => "dots",
+        Dash::Crosses | Dash::Rings => "sign",
     };
     format!("{kind} s{}", style.color)
 }
@@ -188,6 +204,7 @@ fn legend(entries: &[(String, Style)]) -> (String, f64) {
         let y = 14.0 + LEGEND_ROW * f64::from(row);
         let sample = match style.dash {
             Dash::Fill => format!("M{x} {}h28v10h-28Z", y - 9.0),
+            Dash::Crosses | Dash::Rings => format!("M{} {}{}", x + 14.0, y - 4.0, sign(style.dash).unwrap_or_default()),
             Dash::Dots => format!("M{} {y2}h0M{} {y2}h0M{} {y2}h0", x + 4.0, x + 14.0, x + 24.0, y2 = y - 4.0),
             _ => format!("M{x} {}h28", y - 4.0),
         };

@@ -38,6 +38,10 @@ pub enum Dash {
     Fill,
     /// No line: dots.
     Dots,
+    /// No line: crosses.
+    Crosses,
+    /// No line: rings, around other marks.
+    Rings,
 }
 
 impl Style {
@@ -76,12 +80,14 @@ pub struct Panel {
     pub marks: Vec<Mark>,
     /// Words at points, in data coordinates, on top.
     pub labels: Vec<([f64; 2], String)>,
+    /// Words to the right of points.
+    pub notes: Vec<([f64; 2], String)>,
 }
 
 impl Panel {
     /// A panel without marks.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis) -> Self {
-        Self { title: title.into(), x, y, equal: false, marks: Vec::new(), labels: Vec::new() }
+        Self { title: title.into(), x, y, equal: false, marks: Vec::new(), labels: Vec::new(), notes: Vec::new() }
     }
 
     /// With a curve.
@@ -95,7 +101,7 @@ impl Panel {
 /// A figure: panels in rows, under one legend.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// Its number, `4.1`.
+    /// Its number, `4.1`; empty where it has none.
     pub number: &'static str,
     /// What it is, in a line.
     pub title: String,

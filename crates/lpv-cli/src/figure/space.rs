@@ -51,5 +51,6 @@ pub fn path_in_space(title: &str, size: [f64; 3], square: f64, paths: &[PathInSp
         y: Axis::new("up, in the plane of the drawing / m"),
         equal: true,
         marks,
+        notes: Vec::new(),
     }
 }

@@ -1,5 +1,7 @@
 //! A problem solved, and its answer as text and for machines.
 
+use super::stages::{Stages, request};
+use super::trade_off::{TradeOffCurve, TradeOffRow};
 use super::verdict::{failure_at, verdict};
 use super::{ProblemPlan, Scope};
 use crate::certify::polytopic::{self, Transformed};
@@ -9,23 +11,22 @@ use lmi::{Explanation, Outcome, Witness};
 use lpv::certificate::{Claim, Of, Record, Verdict, worst};
 use lpv::math::Mat;
 use lpv::math::decimal::{Rounding, about, at_least, at_most, decimal, fixed};
-use lpv::math::eigen::symmetric_eigenvalues;
+use lpv::math::eigen::largest_singular_value;
 use lpv::math::matrix::{quadratic_form, to_rows};
 use lpv::model::{FrozenModel, Polytope};
 use lpv::synthesis::SynthesisError;
 use lpv::synthesis::polytopic::{
     BackOff, Lyapunov, Moderation, Objective, PolytopicDesign, PolytopicRequest, Solution, Theorem,
-    UnstabilizablePoint, frozen, synthesize,
+    UnstabilizablePoint, frozen,
 };
 use serde::Serialize;
 use serde::ser::SerializeMap;
 use std::path::Path;
-use std::time::Instant;
 
 type Rows = Vec<Vec<f64>>;
 
 /// The word for a design that is one.
-const SOLVED: &str = "solved";
+pub const SOLVED: &str = "solved";
 /// The word where nothing is known.
 const INACCURATE: &str = "inaccurate";
 
@@ -44,7 +45,7 @@ pub struct Report {
     objective_is: &'static str,
     /// Whether the objective is a cost bound, the smaller the better.
     #[serde(skip)]
-    is_cost_bound: bool,
+    pub(super) is_cost_bound: bool,
     /// The objective of the design that is returned; below the optimum where a part of it was given back.
     #[serde(skip_serializing_if = "Option::is_none")]
     achieved: Option<f64>,
@@ -57,6 +58,12 @@ pub struct Report {
     /// Largest singular value of the Kᵢ.
     #[serde(skip_serializing_if = "Option::is_none")]
     largest_gain: Option<f64>,
+    /// √τ: the largest √(uᵀRu) on {V ≤ 1}.
+    #[serde(skip)]
+    effort: Option<f64>,
+    /// Gain against optimum, where it is asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trade_off: Option<TradeOffCurve>,
     /// How the Lyapunov function depends on the parameter.
     lyapunov: &'static str,
     /// What the design was made for: with it `lpv certify` needs no other file.
@@ -169,20 +176,26 @@ const PROVABLE: [BackOff; 6] = [
 
 /// Solve the problem. What is called solved is proved: every claim of `lpv certify` about the file that is written.
 pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
+    solve_from(&Stages::new(plan, path)?)
+}
+
+/// As [`solve`], with the curve of gain against optimum, where there is an optimum.
+pub fn solve_with_trade_off(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
+    let stages = Stages::new(plan, path)?;
+    let mut report = solve_from(&stages)?;
+    if matches!(report.status, SOLVED | INACCURATE) {
+        report.trade_off = Some(TradeOffCurve::new(&stages, &report)?);
+    }
+    Ok(report)
+}
+
+fn solve_from(stages: &Stages) -> Result<Report, Failure> {
+    let plan = stages.plan;
     let tried: &[BackOff] = if plan.back_off == BackOff::Knee { &PROVABLE } else { &[plan.back_off] };
-    let started = Instant::now();
-    let mut iterations = 0;
     let (mut of_polytope, mut first) = (None, None);
     for &back_off in tried {
-        let mut report = solve_with(plan, path, back_off)?;
-        iterations += report.iterations;
-        // a file that our own door refuses has numbers that rounding got the better of
-        let has_gain = report.status == SOLVED || report.status == INACCURATE && report.k.is_some();
-        let claims = if has_gain { claims(&report, path).unwrap_or_default() } else { Vec::new() };
-        report.take_what_is_proved(plan, &claims);
-        report.iterations = iterations;
-        report.seconds = started.elapsed().as_secs_f64();
-        if report.status != SOLVED {
+        let (report, worth) = judged(stages, stages.designs(back_off)?, back_off)?;
+        if report.status != SOLVED && worth.is_none() {
             // of a solver that stopped short on the way more of the optimum given back may be found
             if report.status == INACCURATE && report.k.is_some() {
                 first.get_or_insert(report);
@@ -190,18 +203,43 @@ pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
             }
             return Ok(of_polytope.or(first).unwrap_or(report).without_unproved_gain());
         }
-        match report.is_proved_by(plan, &claims) {
-            Worth::Everything => return Ok(report),
-            Worth::Polytope => of_polytope.get_or_insert(report),
-            Worth::Nothing => first.get_or_insert(report),
+        match worth {
+            Some(Worth::Everything) => return Ok(report),
+            Some(Worth::Polytope) => of_polytope.get_or_insert(report),
+            Some(Worth::Nothing) | None => first.get_or_insert(report),
         };
     }
     let answer = of_polytope.or(first).ok_or_else(|| Failure::Defect("no back-off was tried".into()))?;
     Ok(answer.without_unproved_gain())
 }
 
+/// The report of `designs` with what is proved of it; no worth where they are none.
+pub(super) fn judged(
+    stages: &Stages,
+    designs: Vec<PolytopicDesign>,
+    back_off: BackOff,
+) -> Result<(Report, Option<Worth>), Failure> {
+    let (plan, path) = (stages.plan, stages.path);
+    let request = request(plan, back_off);
+    let guaranteed = guaranteed_cost(plan, &designs, &request).map_err(|error| failure_at(plan, path, error))?;
+    let theorem = Theorem::of(
+        &Polytope::hull(&plan.models),
+        &request,
+        matches!(plan.scope, Scope::Frozen) && plan.models.len() > 1,
+    );
+    let mut report = report(plan, theorem, &designs, guaranteed);
+    report.effort = stages.effort(&designs);
+    // a file that our own door refuses has numbers that rounding got the better of
+    let has_gain = report.status == SOLVED || report.status == INACCURATE && report.k.is_some();
+    let claims = if has_gain { claims(&report, path).unwrap_or_default() } else { Vec::new() };
+    report.take_what_is_proved(plan, &claims);
+    report.seconds = stages.started.elapsed().as_secs_f64();
+    let worth = (report.status == SOLVED).then(|| report.is_proved_by(plan, &claims));
+    Ok((report, worth))
+}
+
 /// What is proved of a design.
-enum Worth {
+pub(super) enum Worth {
     /// Every claim.
     Everything,
     /// Every claim about the polytope, and of the LPV model that it stands for not every one.
@@ -214,34 +252,6 @@ enum Worth {
 fn claims(report: &Report, path: &Path) -> Result<Vec<Claim>, Failure> {
     let text = serde_json::to_string(report).map_err(|error| Failure::serialisation(&error))?;
     polytopic::claims(&Door { file: path }, &text, None, &mut Record::default())
-}
-
-fn solve_with(plan: &ProblemPlan, path: &Path, back_off: BackOff) -> Result<Report, Failure> {
-    let request = PolytopicRequest {
-        weights: plan.weights.clone(),
-        lyapunov: match &plan.scope {
-            Scope::Polytope(lyapunov) => lyapunov.clone(),
-            Scope::Frozen => Lyapunov::Common,
-        },
-        saturation: plan.saturation.clone(),
-        high_gain: plan.high_gain,
-        objective: plan.objective.clone(),
-        back_off,
-    };
-    let failed = |error| failure_at(plan, path, error);
-    let started = Instant::now();
-    let designs = match &plan.scope {
-        Scope::Polytope(_) => vec![synthesize(&Polytope::hull(&plan.models), &request).map_err(failed)?],
-        Scope::Frozen => frozen(&plan.models, &request).map_err(failed)?,
-    };
-    let guaranteed = guaranteed_cost(plan, &designs, &request).map_err(failed)?;
-    let seconds = started.elapsed().as_secs_f64();
-    let theorem = Theorem::of(
-        &Polytope::hull(&plan.models),
-        &request,
-        matches!(plan.scope, Scope::Frozen) && plan.models.len() > 1,
-    );
-    Ok(report(plan, theorem, &designs, guaranteed, seconds))
 }
 
 /// x(0)ᵀP(ρ(0))x(0); of a frozen design P is of ρ(0) itself.
@@ -272,13 +282,7 @@ fn guaranteed_cost(
     Ok(p.map(|p| quadratic_form(&p, &initial.state)))
 }
 
-fn report(
-    plan: &ProblemPlan,
-    theorem: Theorem,
-    designs: &[PolytopicDesign],
-    guaranteed: Option<f64>,
-    seconds: f64,
-) -> Report {
+fn report(plan: &ProblemPlan, theorem: Theorem, designs: &[PolytopicDesign], guaranteed: Option<f64>) -> Report {
     let severity = |design: &PolytopicDesign| match status(design) {
         "infeasible" | "infeasible within a radius" => 3,
         "unbounded" | "unbounded to tolerance" => 2,
@@ -301,7 +305,7 @@ fn report(
     });
     let inside = guaranteed.zip(plan.saturation.as_ref()).map(|(bound, saturation)| bound <= saturation.gamma);
     let (verdict, verdict_reason) = verdict(plan, &designs[worst], inside);
-    let (objective, objective_is) = objective(plan, designs, &PolytopicDesign::optimum);
+    let (objective, objective_is) = objective(plan, designs.iter().map(PolytopicDesign::optimum));
     let moderations: Vec<&Moderation> = designs.iter().filter_map(|design| design.moderation.as_ref()).collect();
     let gains = solutions.iter().flatten().flat_map(|solution| &solution.gain);
     let largest_gain = gains.map(largest_singular_value).reduce(f64::max);
@@ -330,11 +334,15 @@ fn report(
         objective: solutions.as_ref().and(objective),
         objective_is,
         is_cost_bound: plan.weights.is_some() && !plan.region && !matches!(plan.objective, Objective::Trace),
-        achieved: solutions.as_ref().and_then(|_| self::objective(plan, designs, &|design| design.answer.objective).0),
+        achieved: solutions
+            .as_ref()
+            .and_then(|_| self::objective(plan, designs.iter().map(|design| design.answer.objective)).0),
         back_off: moderations.iter().map(|moderation| moderation.back_off).reduce(f64::max),
         optimum_is_attained: (!moderations.is_empty())
             .then(|| moderations.iter().all(|moderation| moderation.is_attained)),
         largest_gain,
+        effort: None,
+        trade_off: None,
         places: plan.places.clone(),
         y: matrices(&|solution| solution.y.clone()),
         p: matrices(&|solution| solution.p.clone()),
@@ -352,7 +360,7 @@ fn report(
             Margins(all.iter().enumerate().flat_map(of).collect())
         }),
         iterations: designs.iter().map(|design| design.answer.iterations.len()).sum(),
-        seconds,
+        seconds: 0.0,
         verdict,
         verdict_reason,
         witness: witness(&designs[worst]),
@@ -361,10 +369,6 @@ fn report(
         explanation: designs[worst].explanation.clone(),
         place: (designs.len() > 1 && severity(&designs[worst]) > 0).then(|| plan.places[worst].clone()),
     }
-}
-
-fn largest_singular_value(k: &Mat<f64>) -> f64 {
-    symmetric_eigenvalues(&(k * k.transpose())).into_iter().fold(0.0, f64::max).sqrt()
 }
 
 fn status(design: &PolytopicDesign) -> &'static str {
@@ -378,13 +382,8 @@ fn status(design: &PolytopicDesign) -> &'static str {
     }
 }
 
-/// The objective of the problem, of the values `of` its designs.
-fn objective(
-    plan: &ProblemPlan,
-    designs: &[PolytopicDesign],
-    of: &dyn Fn(&PolytopicDesign) -> f64,
-) -> (Option<f64>, &'static str) {
-    let all = designs.iter().map(of);
+/// The objective of the problem, of those of its designs, with its name.
+pub(super) fn objective(plan: &ProblemPlan, all: impl Iterator<Item = f64>) -> (Option<f64>, &'static str) {
     match (&plan.objective, &plan.saturation) {
         _ if plan.weights.is_none() => {
             (all.reduce(f64::min), "largest margin t with every inequality at least tI, tr Y <= n")
@@ -448,6 +447,17 @@ impl Report {
                 "every claim of lpv certify about K and P as they are printed; the solver stopped short of the optimum"
                     .into();
         }
+    }
+
+    /// The share of the optimum that the design of the report has given back; `None` where there is no design.
+    pub(super) fn chosen_share(&self) -> Option<f64> {
+        (self.status == SOLVED).then_some(self.back_off.unwrap_or(0.0))
+    }
+
+    /// As a point of the curve at `share`.
+    pub(super) fn row(&self, share: f64) -> TradeOffRow {
+        let Self { status, verdict, achieved, effort, largest_gain, .. } = *self;
+        TradeOffRow { back_off: share, status, verdict, achieved, effort, largest_gain }
     }
 
     /// No gain is shown as if it were an answer.
@@ -554,6 +564,9 @@ impl Report {
         if let Some(explanation) = self.explanation.as_ref().filter(|_| !self.has_unstabilizable_point()) {
             text.push_str(&format!("{explanation}\n"));
         }
+        if let Some(curve) = &self.trade_off {
+            text.push_str(&curve.text());
+        }
         text
     }
 
@@ -566,7 +579,7 @@ impl Report {
         let place = self.place.as_ref().map_or(String::new(), |place| format!(" at {place}"));
         let message = format!("{}: {}{place}: {}", path.display(), self.status, self.verdict_reason);
         match self.status {
-            SOLVED => None,
+            SOLVED => (self.verdict < Verdict::Numerical).then_some(Failure::NotCertified(message)),
             "infeasible" | "unbounded" => Some(Failure::NoOptimum(message + &self.relaxation())),
             INACCURATE => Some(Failure::NotCertified(message)),
             _ => Some(Failure::NotCertified(message + &self.relaxation())),

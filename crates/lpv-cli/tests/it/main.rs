@@ -12,5 +12,6 @@ mod soundness;
 mod stages;
 mod step_bounds;
 mod thesis;
+mod trade_off;
 mod transformation;
 mod transformed;

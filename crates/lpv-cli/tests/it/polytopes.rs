@@ -142,6 +142,32 @@ fn an_input_for_every_state() {
     }
 }
 
+/// Inputs that almost pull together, weak ones and strong ones: V of the design is well conditioned, and the gain is what the plant asks for. The least
+/// singular value of B moves x1 alone, so that a gain of ‖A‖ over it is needed, and a few times that is found.
+#[test]
+fn inputs_of_any_size_and_direction() {
+    let asked = |b: [[f64; 2]; 2]| {
+        let b_squared = from_rows(&b.map(|row| row.to_vec()));
+        let least = symmetric_eigenvalues(&(&b_squared * b_squared.transpose()))[0].sqrt();
+        30.0_f64.sqrt() / least
+    };
+    for b in [
+        [[1.0, 0.0], [1e3, 1.0]],
+        [[1.0, 0.0], [1e6, 1.0]],
+        [[1e-9, 0.0], [1e-6, 1e-9]],
+        [[1e-9, 0.0], [0.0, 1e-9]],
+        [[1e9, 0.0], [0.0, 1e9]],
+        [[1e-9, 0.0], [0.0, 1e9]],
+    ] {
+        let text = format!("[model]\nA = [[1, 2], [3, 4]]\nB = {b:?}\n[design]\nmethod = \"stabilize\"\n");
+        let answer: Value = serde_json::from_str(&Place::with(text).succeed("design scenario.toml --json")).unwrap();
+        assert_eq!((&answer["status"], &answer["verdict"]), (&"solved".into(), &"proved".into()), "{answer}");
+        assert!(answer["objective"].as_f64().unwrap() > 1.0, "{answer}");
+        let gain = answer["largest_gain"].as_f64().unwrap();
+        assert!(gain < 10.0 * asked(b), "{b:?}: {gain:e} of {:e}", asked(b));
+    }
+}
+
 /// What cannot be proved shows no gain.
 #[test]
 fn no_gain_without_a_proof() {

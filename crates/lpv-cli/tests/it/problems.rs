@@ -12,6 +12,15 @@ fn answer(text: &str) -> Value {
     serde_json::from_str(&place.succeed("design scenario.toml --json")).unwrap()
 }
 
+/// Of a problem that is solved and whose verdict is `undecided`: what was asked is not answered.
+fn undecided(text: &str, words: &[&str]) -> Value {
+    let ended = Place::with(text).lpv("design scenario.toml --json");
+    ended.refuses(4, words);
+    let answer: Value = serde_json::from_str(&ended.out).unwrap();
+    assert_eq!((&answer["status"], &answer["verdict"]), (&"solved".into(), &"undecided".into()));
+    answer
+}
+
 fn close(value: &Value, expected: f64, tolerance: f64) {
     let value = value.as_f64().unwrap();
     assert!((value - expected).abs() < tolerance, "{value} is not {expected}");
@@ -44,9 +53,9 @@ fn high_gain_regulator() {
 /// Outside the certified set the bound is printed, and that nothing is guaranteed.
 #[test]
 fn initial_state_outside_the_set() {
-    let answer = answer(&edited(DOUBLE_INTEGRATOR, "gamma = 60", "gamma = 1"));
+    let answer = undecided(&edited(DOUBLE_INTEGRATOR, "gamma = 60", "gamma = 1"), &["outside the certified set"]);
     close(&answer["guaranteed_cost"], 5.92367, 1e-4);
-    assert_eq!((&answer["inside_certified_set"], &answer["verdict"]), (&false.into(), &"undecided".into()));
+    assert_eq!(answer["inside_certified_set"], false);
 }
 
 /// An infeasible problem ends with code 3, its witness and the reason; the answer is printed all the same. The hull of the yaw circle
@@ -109,11 +118,12 @@ fn theorems() {
         (PENDULUM, "Theorem 4.4"),
         (&common, "Corollary 4.1"),
         (&varying, "Theorem 4.3"),
-        (&edited(&common, "\"common\"", "\"frozen\""), "Theorem 4.5"),
         (DOUBLE_INTEGRATOR, "Theorem 5.2"),
     ] {
         assert_eq!(answer(text)["theorem"], theorem);
     }
+    let frozen = undecided(&edited(&common, "\"common\"", "\"frozen\""), &["frozen design"]);
+    assert_eq!(frozen["theorem"], "Theorem 4.5");
 }
 
 /// The gain that is returned meets the inequality of every mixture, at both vertices, with a general R too.
@@ -148,7 +158,7 @@ fn plant_at_a_bounded_rate() {
 fn frozen_designs_for_an_initial_state() {
     let frozen =
         edited(PENDULUM, "lyapunov = \"parameter-dependent\"", "lyapunov = \"frozen\"\nobjective = \"initial-state\"");
-    let answer = answer(&edited(&frozen, "rate_bound = 0.87236364", "# rate_bound"));
+    let answer = undecided(&edited(&frozen, "rate_bound = 0.87236364", "# rate_bound"), &["frozen design"]);
     close(&answer["guaranteed_cost"], 55.865797, 1e-5);
 }
 
@@ -166,11 +176,10 @@ fn plant_on_an_arc() {
 fn frozen_regulator() {
     let frozen = edited(PENDULUM, "lyapunov = \"parameter-dependent\"", "lyapunov = \"frozen\"");
     let frozen = edited(&frozen, "rate_bound = 0.87236364", "# rate_bound");
-    let at_the_vertices = answer(&frozen);
+    let at_the_vertices = undecided(&frozen, &["frozen design", "nothing is claimed once it moves"]);
     close(&at_the_vertices["guaranteed_cost"], 55.865797, 1e-5);
-    assert_eq!(at_the_vertices["verdict"], "undecided");
     let between = edited(&frozen, "[weights]", "grid = [[1, 0], [0.75, 0.25], [0.5, 0.5]]\n[weights]");
-    let between = answer(&between);
+    let between = undecided(&between, &["frozen design"]);
     assert_eq!(between["K"].as_array().unwrap().len(), 3);
     close(&between["guaranteed_cost"], 55.865797, 1e-5);
 }
@@ -278,6 +287,33 @@ fn gains_from_elsewhere_are_certified() {
     }
     place.write("design.json", file("[[3, 3]]", "[[4, 1], [1, 1]]"));
     place.lpv("certify design.json --rate 1").refuses(2, &["--rate", "rate_vertices"]);
+}
+
+/// A file that `lpv design` wrote without a design says why, and how it ended counts.
+#[test]
+fn an_answer_without_a_design_is_told_as_such() {
+    let infeasible = edited(DOUBLE_INTEGRATOR, "A = [[0, 1], [0, 0]]", "A = [[1, 0], [0, -1]]");
+    let open = "[model]\nA = [[1, 1e-300], [0, -1]]\nB = [[0], [1]]\n[design]\nmethod = \"stabilize\"\n";
+    let undetectable = "[model]\nA = [[0, 0], [0, -1]]\nB = [[1], [1]]\n[weights]\nQ_diag = [0, 1]\nR = [[1]]\n[design]\nmethod = \"lpvqr\"\n";
+    for (text, code, status, reason) in [
+        (&*infeasible, 3, "infeasible", "no input moves x1"),
+        (undetectable, 3, "unbounded", "costs nothing"),
+        (open, 4, "inaccurate", "stopped short"),
+    ] {
+        let place = Place::with(text);
+        assert_eq!(place.lpv("design scenario.toml -o design.json").code, code);
+        let ended = place.lpv("certify design.json --record design.jsonl");
+        ended.refuses(code, &["design.json", "holds no design", &format!("\"{status}\""), reason]);
+        assert_eq!(place.list("."), ["design.json", "scenario.toml"], "nothing is recorded");
+        // an edited file is no better off, and a message is one line
+        let mut answer = place.json("design.json");
+        answer["verdict_reason"] = "a\nb".into();
+        place.write("design.json", answer.to_string());
+        place.lpv("certify design.json").refuses(code, &["a b"]);
+        answer["status"] = "solved".into();
+        place.write("design.json", answer.to_string());
+        place.lpv("certify design.json").refuses(2, &["is missing: without it there is nothing to certify"]);
+    }
 }
 
 /// The commutator benchmark of LPVTools with a cubic P on ten grid points.

@@ -145,6 +145,14 @@ fn report_holds_the_data_and_loads_nothing() {
     assert_eq!(samples, 301);
     let runs = data["runs"].as_array().unwrap();
     assert_eq!(runs.len(), 4);
+    // the largest singular value of K over the grid, which for one input is its length; nothing is said of a share of the optimum
+    for run in runs {
+        let design = place.json(&format!("out/cart/design-{}.json", run["id"].as_str().unwrap()));
+        let gain: Vec<f64> = serde_json::from_value(design["points"][0]["gain"][0].clone()).unwrap();
+        let length = gain.iter().map(|k| k * k).sum::<f64>().sqrt();
+        assert!((run["largest_gain"].as_f64().unwrap() / length - 1.0).abs() < 1e-5, "{length}");
+        assert!(run["back_off"].is_null());
+    }
     for run in runs {
         for series in ["states", "inputs"] {
             for values in run[series].as_array().unwrap() {

@@ -174,7 +174,8 @@ fn samples_are_proved_for_the_polytope_alone() {
             samples.join(", ")
         ),
     );
-    place.succeed("design scenario.toml -o design.json");
+    let ended = place.lpv("design scenario.toml -o design.json");
+    ended.refuses(4, &["of the polytope of the vertices alone"]);
     let design = place.json("design.json");
     assert_eq!((&design["status"], &design["verdict"]), (&json!("solved"), &json!("undecided")));
     assert!(design["verdict_reason"].as_str().unwrap().contains("of the polytope of the vertices alone"));

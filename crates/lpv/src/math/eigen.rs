@@ -94,6 +94,11 @@ fn nan_max(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
+/// √λ_max(KKᵀ), the largest singular value of K.
+pub fn largest_singular_value(k: &Mat<f64>) -> f64 {
+    symmetric_eigenvalues(&(k * k.transpose())).into_iter().fold(0.0, f64::max).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

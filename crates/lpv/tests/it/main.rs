@@ -19,4 +19,5 @@ mod sampled_cost;
 mod scheduled;
 mod synthesis;
 mod tensor_product;
+mod trade_off;
 mod units;

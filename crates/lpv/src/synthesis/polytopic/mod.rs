@@ -20,8 +20,12 @@ mod inequality;
 mod moderation;
 mod objective;
 mod rates;
+mod regulation;
+mod restatement;
 mod separation;
+mod stabilization;
 mod theorem;
+mod trade_off;
 mod units;
 mod unstabilizable;
 
@@ -30,22 +34,21 @@ pub use objective::Objective;
 pub use rates::rate_box_vertices;
 pub use separation::Separation;
 pub use theorem::Theorem;
+pub use trade_off::{TradeOff, TradeOffPoint};
 pub use unstabilizable::UnstabilizablePoint;
 
-use super::high_gain::Segment;
 use super::{CostWeights, HighGainOptions, SynthesisError};
 use crate::math::Mat;
-use crate::math::eigen::smallest_eigenvalue;
-use crate::math::matrix::{inverse_spd, is_diagonal, symmetric_part, trace};
-use crate::math::riccati::{self, Regulator, RiccatiError};
+use crate::math::matrix::{inverse_spd, symmetric_part};
 use crate::math::stabilizability::{Mode, Stabilizability, stabilizability};
-use crate::math::unmoved::sum_is_zero;
 use crate::model::{FrozenModel, Polytope};
-use inequality::{DoubleSum, Unknowns, Weights};
-use lmi::{Answer, BlockReport, Carrier, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
-use moderation::{COST_LADDER, MARGIN_LADDER, Moderated, Stage};
-use objective::{COST_BOUND, MARGIN, Posed};
-use units::{Units, scaled};
+use inequality::Unknowns;
+use lmi::{Answer, Explanation, Expr, InaccurateReason, Options, Outcome, Problem};
+use moderation::Moderated;
+use regulation::{Regulation, WhereStalled};
+use stabilization::Stabilization;
+use std::cell::OnceCell;
+use units::Units;
 
 /// The Lyapunov function xᵀY(ρ)⁻¹x.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,7 +98,7 @@ pub struct HighGain {
 }
 
 /// What was found, whatever the outcome.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct PolytopicDesign {
     /// The solver's answer: outcome, objective, blocks with rigorous margins, witness. Where a part of the optimum was given back objective
     /// and blocks are those of the design that is returned, and the outcome is that of the optimum.
@@ -189,32 +192,122 @@ impl Solution {
     }
 }
 
+/// The optimum of a request, from which a design follows for every back-off: what takes most of the time is done once.
+pub struct FirstStage {
+    polytope: Polytope,
+    request: PolytopicRequest,
+    /// In units of its own.
+    own: Option<(Units, Optimum)>,
+    /// As the problem is stated, where that is needed.
+    stated: OnceCell<Optimum>,
+}
+
+enum Optimum {
+    Stabilization(Box<Stabilization>),
+    Regulation(Box<Regulation>),
+}
+
+impl Optimum {
+    fn new(polytope: &Polytope, request: &PolytopicRequest) -> Result<Self, SynthesisError> {
+        Ok(match &request.weights {
+            Some(weights) => {
+                Self::Regulation(Box::new(Regulation::new(polytope, request, weights, WhereStalled::Refute)?))
+            }
+            None => Self::Stabilization(Box::new(Stabilization::new(polytope, &request.lyapunov)?)),
+        })
+    }
+
+    fn design(&self, back_off: BackOff) -> Result<PolytopicDesign, SynthesisError> {
+        match self {
+            Self::Stabilization(stage) => stage.design(back_off),
+            Self::Regulation(stage) => stage.design(back_off),
+        }
+    }
+
+    fn answer(&self) -> &Answer {
+        match self {
+            Self::Stabilization(stage) => stage.answer(),
+            Self::Regulation(stage) => stage.answer(),
+        }
+    }
+}
+
+impl FirstStage {
+    /// Solve for the optimum of `request` over `polytope`, whatever its back-off.
+    ///
+    /// # Errors
+    /// Problems without meaning. Infeasible, unbounded and inaccurate are outcomes in the answers of the designs.
+    ///
+    /// # Panics
+    /// If sizes of weights, bounds, rates or objective do not fit the polytope; for a high gain of more than 10 inputs with a general R, or of
+    /// more than 64.
+    pub fn new(polytope: &Polytope, request: &PolytopicRequest) -> Result<Self, SynthesisError> {
+        let own = match Units::of(polytope, request) {
+            Some(units) => {
+                let optimum = Optimum::new(&units.polytope(polytope), &units.request(request))?;
+                Some((units, optimum))
+            }
+            None => None,
+        };
+        Ok(Self { polytope: polytope.clone(), request: request.clone(), own, stated: OnceCell::new() })
+    }
+
+    /// The design with `back_off` of the optimum given back.
+    ///
+    /// # Errors
+    /// Problems without meaning; no high gain that is stable at the sample time, with the number of the vertex (from 0) for the
+    /// parameter.
+    pub fn design(&self, back_off: BackOff) -> Result<PolytopicDesign, SynthesisError> {
+        // an error, and what is refuted, is told of the problem as it is stated
+        if let Some((units, optimum)) = &self.own
+            && let Ok(design) = optimum.design(back_off)
+            && let Some(design) = restatement::restated(&self.polytope, &self.request, units, design)
+        {
+            return Ok(design);
+        }
+        self.stated()?.design(back_off)
+    }
+
+    fn stated(&self) -> Result<&Optimum, SynthesisError> {
+        if let Some(optimum) = self.stated.get() {
+            return Ok(optimum);
+        }
+        let optimum = Optimum::new(&self.polytope, &self.request)?;
+        Ok(self.stated.get_or_init(|| optimum))
+    }
+
+    /// R⁻¹ of the effort uᵀRu that is kept small.
+    fn r_inverse(&self) -> Option<Mat<f64>> {
+        match &self.request.weights {
+            Some(weights) => inverse_spd(&weights.r),
+            None => Some(stabilization::input_units(&self.polytope)),
+        }
+    }
+
+    /// f*, as far as the solver came, and whether that is the optimum to its tolerance.
+    fn optimum(&self) -> Result<(f64, bool), SynthesisError> {
+        Ok(match &self.own {
+            Some((units, optimum)) => {
+                let answer = optimum.answer();
+                (units.objective(&self.request.objective) * answer.objective, answer.outcome.is_optimal())
+            }
+            None => {
+                let answer = self.stated()?.answer();
+                (answer.objective, answer.outcome.is_optimal())
+            }
+        })
+    }
+}
+
 /// The theorem of `request` for `polytope`.
 ///
 /// # Errors
-/// Problems without meaning; no high gain that is stable at the sample time, with the number of the vertex (from 0) for the
-/// parameter. Infeasible, unbounded and inaccurate are outcomes in the answer.
+/// As [`FirstStage::new`] and [`FirstStage::design`].
 ///
 /// # Panics
-/// If sizes of weights, bounds, rates or objective do not fit the polytope; for a high gain of more than 10 inputs with a general R, or of
-/// more than 64.
+/// As [`FirstStage::new`].
 pub fn synthesize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
-    // an error is told in the problem's own units
-    if let Some(units) = Units::of(polytope, request)
-        && let Ok(design) = in_its_units(&units.polytope(polytope), &units.request(request))
-        && let Some(design) = restated(polytope, request, &units, design)
-    {
-        return Ok(design);
-    }
-    in_its_units(polytope, request)
-}
-
-/// The problem as it stands, whatever the size of its numbers.
-fn in_its_units(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
-    match &request.weights {
-        Some(weights) => regulate(polytope, request, weights, WhereStalled::Refute),
-        None => stabilize(polytope, request),
-    }
+    FirstStage::new(polytope, request)?.design(request.back_off)
 }
 
 /// Theorems 4.5, 5.1-5.4 at single models: each is designed as if the parameter stood still there.
@@ -233,526 +326,6 @@ pub fn frozen(models: &[FrozenModel], request: &PolytopicRequest) -> Result<Vec<
 /// x(0)ᵀPx(0) six digits where the default, 10⁻⁹, gives four or five. Where rounding ends the iteration sooner, what was reached counts.
 fn solver() -> Options {
     Options { gap_tolerance: 1e-12, ..Options::default() }
-}
-
-/// The design of a problem in its own `units` as one of the problem as it is stated; `None` where it is not solved, or not proved as stated.
-fn restated(
-    polytope: &Polytope,
-    request: &PolytopicRequest,
-    units: &Units,
-    design: PolytopicDesign,
-) -> Option<PolytopicDesign> {
-    let solution = design.solution.as_ref().filter(|_| design.is_solved())?;
-    let each = |of: &[Mat<f64>], factor: f64| of.iter().map(|matrix| scaled(matrix, factor)).collect::<Vec<_>>();
-    let mut restated = Solution {
-        y: each(&solution.y, units.y()),
-        l: each(&solution.l, units.l()),
-        p: each(&solution.p, 1.0 / units.y()),
-        gain: each(&solution.gain, units.gain()),
-        auxiliary_gain: solution.auxiliary_gain.as_ref().map(|gain| each(gain, units.gain())),
-        s: solution.s,
-        mixtures: Vec::new(),
-    };
-    let objective = units.objective(&request.objective);
-    let Some(cost) = &request.weights else {
-        let StabilityProblem { problem, .. } = StabilityProblem::new(polytope, request);
-        return Some(PolytopicDesign {
-            answer: problem.restated(&design.answer, &unknown_factors(&problem, units, objective), objective)?,
-            moderation: design.moderation.map(|moderation| moderation.times(objective)),
-            solution: Some(restated),
-            ..design
-        });
-    };
-    let weights = Weights::new(cost)?;
-    let posed = RegulatorProblem::new(polytope, request, cost, &weights);
-    let answer = match design.riccati {
-        // Y and L are not the solver's
-        Some(_) => {
-            let blocks = posed.problem.verify(&[restated.y[0].clone(), restated.l[0].clone()]).ok()?;
-            if !blocks.iter().all(|block| block.verified_lower_bound > 0.0) {
-                return None;
-            }
-            let mut answer = design.answer;
-            (answer.objective, answer.optimum_bound, answer.blocks) = (objective * answer.objective, None, blocks);
-            answer
-        }
-        None => {
-            let factors = unknown_factors(&posed.problem, units, objective);
-            posed.problem.restated(&design.answer, &factors, objective)?
-        }
-    };
-    if let Some(s) = restated.s {
-        restated.mixtures = posed.mixtures(polytope, request, &weights, s, &answer);
-    }
-    Some(PolytopicDesign {
-        answer,
-        moderation: design.moderation.map(|moderation| moderation.times(objective)),
-        solution: Some(restated),
-        ..design
-    })
-}
-
-/// By how much each unknown of a problem is larger than in `units`: Y, L and M, and the scalar that is optimised.
-fn unknown_factors(problem: &Problem, units: &Units, objective: f64) -> Vec<f64> {
-    let factor = |name: &String| match name.as_str() {
-        MARGIN | COST_BOUND => objective,
-        name if name.starts_with('Y') => units.y(),
-        _ => units.l(),
-    };
-    problem.unknown_names().iter().map(factor).collect()
-}
-
-/// Theorems 4.1 and 4.2: the largest t with every inequality ⪰ tI, where tr Yᵢ ≤ n fixes the scale.
-struct StabilityProblem {
-    problem: Problem,
-    unknowns: Unknowns,
-    /// t
-    margin: Expr,
-}
-
-impl StabilityProblem {
-    fn new(polytope: &Polytope, request: &PolytopicRequest) -> Self {
-        let n = polytope.states();
-        let mut problem = Problem::new();
-        let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
-        let margin = problem.scalar(MARGIN);
-        let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-        for (k, (name, block)) in sum.stability(&unknowns.l, &margin).into_iter().enumerate() {
-            match sum.leads(k) {
-                true => problem.positive_definite_by(name, block, 0.0),
-                false => problem.positive_definite_lazily(name, block, Some(0.0), sum.family(k)),
-            }
-        }
-        for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
-            problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
-            let trace = Expr::constant(Mat::from_fn(1, 1, |_, _| n as f64)) - y.trace();
-            problem.positive_definite_by(format!("scale of Y{}", i + 1), trace, 0.0);
-        }
-        problem.maximize(&margin);
-        Self { problem, unknowns, margin }
-    }
-}
-
-fn stabilize(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
-    let StabilityProblem { mut problem, unknowns, margin: t } = StabilityProblem::new(polytope, request);
-    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-    let terms = sum.stability_terms();
-    let mut answer = problem.solve(&solver())?;
-    if matches!(answer.outcome, Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_)) {
-        // where every state has an input of its own any decay can be had: as fast as the plant itself is enough
-        let speed = (0..polytope.len()).map(|i| polytope.a(i).norm_l2()).fold(0.0, f64::max);
-        let ceiling = 2.0 * if speed > 0.0 { speed } else { 1.0 };
-        let ceiling = Expr::constant(Mat::from_fn(1, 1, |_, _| ceiling)) - &t;
-        problem.positive_definite_by("ceiling of the margin", ceiling, 0.0);
-        answer = problem.solve(&solver())?;
-    }
-    let solved = answer.outcome.is_optimal();
-    let moderated = |answer: Answer| -> Result<PolytopicDesign, SynthesisError> {
-        let identity = Mat::identity(polytope.inputs(), polytope.inputs());
-        let stage = Stage {
-            problem: &problem,
-            objective: &Posed { value: t.clone(), is_maximised: true },
-            least: LEAST_MARGIN,
-            l: &unknowns.l,
-            y: &unknowns.y,
-            r_inverse: &identity,
-            q: None,
-            ladder: &MARGIN_LADDER,
-            reference: &[],
-        };
-        let moderated = stage.moderate(answer, request.back_off, &solver())?;
-        finish(&problem, moderated, &unknowns, None)
-    };
-    if solved && answer.objective > LEAST_MARGIN {
-        let design = moderated(answer.clone())?;
-        if design.moderation.is_some() || request.back_off == BackOff::Nothing {
-            return Ok(design);
-        }
-    }
-    // the scale allows t = 0 always: what there is nothing above for is said by a point, or by the strict problem's witness
-    let point = (rests(&request.lyapunov).then(|| {
-        unstabilizable::vertex(polytope).or_else(|| unstabilizable::point(polytope, &terms, &answer.multipliers))
-    }))
-    .flatten();
-    if let Some(point) = point.as_ref().filter(|point| point.is_proved) {
-        let explanation = Explanation { distance: 0.0, carriers: carriers(&point.weights) };
-        let refuted = PolytopicDesign::without_solution(answer);
-        return Ok(PolytopicDesign { explanation: Some(explanation), unstabilizable: Some(point.clone()), ..refuted });
-    }
-    if request.lyapunov == Lyapunov::Common
-        && let Some(separation) = Separation::of(polytope)
-    {
-        let explanation = Explanation { distance: 0.0, carriers: carriers(&separation.shares) };
-        let refuted = PolytopicDesign::without_solution(answer);
-        return Ok(PolytopicDesign { explanation: Some(explanation), separation: Some(separation), ..refuted });
-    }
-    let mut design = match solved {
-        true => stabilize_strictly(polytope, request)?,
-        false => moderated(answer)?,
-    };
-    let is_stalled = !design.is_solved() && matches!(design.answer.outcome, Outcome::Inaccurate(_));
-    if is_stalled
-        && request.back_off != BackOff::Nothing
-        && let Some(values) = stabilizing(polytope, request)?
-    {
-        let with_margin = |t: f64| [values.as_slice(), &[Mat::from_fn(1, 1, |_, _| t)]].concat();
-        let blocks = sum.stability(&unknowns.l, &Expr::zeros(1, 1));
-        // of a pair of vertices the margin counts twice
-        let weighted = |(block, (i, j)): (&(String, Expr), &(usize, usize)), at: &Answer| {
-            smallest_eigenvalue(&at.value(&block.1)) / if i == j { 1.0 } else { 2.0 }
-        };
-        let moved = problem.moved(&design.answer, with_margin(0.0)).and_then(|at| {
-            let margins = blocks.iter().zip(&terms).map(|pair| weighted(pair, &at));
-            problem.moved(&at, with_margin(LESS * margins.fold(f64::INFINITY, f64::min)))
-        });
-        if let Some(answer) = moved {
-            // from there the gain may be made smaller as from an optimum
-            let smaller = moderated(answer.clone())?;
-            design = match smaller.moderation.is_some() {
-                true => smaller,
-                false => {
-                    let moderation = Some(Moderation { back_off: 0.0, optimum: answer.objective, is_attained: false });
-                    finish(&problem, Moderated { answer, moderation }, &unknowns, None)?
-                }
-            };
-        }
-    }
-    design.withdraw_infeasible(polytope);
-    design.unstabilizable = point;
-    Ok(design)
-}
-
-/// Y and L of a regulator with Q = I and R = I, which stabilises too, for where the largest margin is too small for the solver: scaled to
-/// tr Y ≤ n, one matrix for each unknown of the stabilisation but the margin. `None` where there is none.
-fn stabilizing(polytope: &Polytope, request: &PolytopicRequest) -> Result<Option<Vec<Mat<f64>>>, SynthesisError> {
-    let (n, m) = (polytope.states(), polytope.inputs());
-    let cost = CostWeights { q: Mat::identity(n, n), r: Mat::identity(m, m) };
-    let request =
-        PolytopicRequest { saturation: None, high_gain: None, objective: Objective::Trace, ..request.clone() };
-    let design = regulate(polytope, &request, &cost, WhereStalled::Stop)?;
-    let Some(Solution { y, l, .. }) = design.solution.as_ref().filter(|_| design.is_solved()) else { return Ok(None) };
-    let scale = LESS * n as f64 / y.iter().map(trace).fold(0.0, f64::max);
-    let distinct = if request.lyapunov == Lyapunov::Common { 1 } else { y.len() };
-    Ok(Some(y[..distinct].iter().chain(l).map(|matrix| scale * matrix).collect()))
-}
-
-/// A little less than 1, so that what is scaled is strict.
-const LESS: f64 = 1.0 - 1e-6;
-
-/// Whether the parameter may rest: zero is in the hull of the rate vertices, as far as their mean, taken exactly, tells.
-fn rests(lyapunov: &Lyapunov) -> bool {
-    let Lyapunov::ParameterDependent { rate_vertices } = lyapunov else { return true };
-    let rates = |i: usize| rate_vertices.iter().map(|nu| nu[i]).collect::<Vec<f64>>();
-    rate_vertices.iter().any(|nu| nu.iter().all(|&rate| rate == 0.0))
-        || rate_vertices.first().is_some_and(|first| (0..first.len()).all(|i| sum_is_zero(&rates(i))))
-}
-
-/// The stability inequalities of the vertices that refute together, with their shares, largest first.
-fn carriers(shares: &[f64]) -> Vec<Carrier> {
-    let count = shares.len();
-    let mut carriers: Vec<Carrier> = (shares.iter().enumerate())
-        .filter(|&(_, &share)| share > 1e-3)
-        .map(|(i, &share)| Carrier {
-            name: if count == 1 { "stability".into() } else { format!("stability at vertex {}", i + 1) },
-            share,
-            alone: None,
-        })
-        .collect();
-    carriers.sort_by(|a, b| b.share.total_cmp(&a.share));
-    carriers
-}
-
-/// The inequalities of Theorems 4.1 and 4.2 with Yᵢ ⪰ I for the scale, which they are homogeneous in, and no objective: the problem that
-/// has a witness where they contradict each other.
-fn stabilize_strictly(polytope: &Polytope, request: &PolytopicRequest) -> Result<PolytopicDesign, SynthesisError> {
-    let n = polytope.states();
-    let mut strict = Problem::new();
-    let unknowns = Unknowns::new(&mut strict, polytope, &request.lyapunov);
-    let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-    for (k, (name, block)) in sum.stability(&unknowns.l, &Expr::zeros(1, 1)).into_iter().enumerate() {
-        match sum.leads(k) {
-            true => strict.positive_definite(name, block),
-            false => strict.positive_definite_lazily(name, block, None, sum.family(k)),
-        }
-    }
-    for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
-        strict.positive_definite_by(format!("Y{} ⪰ I", i + 1), *y - Expr::identity(n), 0.0);
-    }
-    let answer = strict.solve(&solver())?;
-    finish(&strict, answer.into(), &unknowns, None)
-}
-
-/// Margin of stability, of tr Y = n, below which the answer is taken for zero.
-const LEAST_MARGIN: f64 = 1e-7;
-
-/// What is done where the solver finds no regulator.
-#[derive(Clone, Copy, PartialEq)]
-enum WhereStalled {
-    /// Ask why: whether anything stabilises.
-    Refute,
-    /// Nothing: that is who asks.
-    Stop,
-}
-
-/// The inequalities of Theorems 2.1, 4.3, 4.4 and 5.1-5.4.
-struct RegulatorProblem {
-    problem: Problem,
-    unknowns: Unknowns,
-    /// Mᵢ, where mixtures of it with Lᵢ are inequalities: of a high gain with general R. With diagonal R the low gain L = M is optimal, and every K_s
-    /// satisfies the 2^m inequalities (`high_gain`).
-    auxiliary: Option<Vec<Expr>>,
-    objective: Posed,
-}
-
-impl RegulatorProblem {
-    fn new(polytope: &Polytope, request: &PolytopicRequest, cost: &CostWeights, weights: &Weights) -> Self {
-        let mut problem = Problem::new();
-        let unknowns = Unknowns::new(&mut problem, polytope, &request.lyapunov);
-        let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-        let auxiliary: Option<Vec<Expr>> = request.high_gain.filter(|_| !is_diagonal(&cost.r)).map(|_| {
-            let (m, n) = (polytope.inputs(), polytope.states());
-            (0..polytope.len()).map(|i| problem.rectangular(format!("M{}", i + 1), m, n)).collect()
-        });
-        let blocks = performance(&sum, auxiliary.as_deref(), &unknowns.l, weights);
-        for (k, (name, block)) in blocks.into_iter().enumerate() {
-            match sum.leads(k) {
-                true => problem.positive_definite(name, block),
-                false => problem.positive_definite_lazily(name, block, None, sum.family(k)),
-            }
-        }
-        for (i, y) in distinct(&unknowns.y, &request.lyapunov).iter().enumerate() {
-            problem.positive_definite(format!("Y{} definite", i + 1), (*y).clone());
-        }
-        if let Some(bounds) = &request.saturation {
-            for (name, block) in sum.unsaturated(auxiliary.as_ref().unwrap_or(&unknowns.l), bounds) {
-                problem.positive_definite(name, block);
-            }
-        }
-        let objective = request.objective.pose(&mut problem, &distinct(&unknowns.y, &request.lyapunov), &unknowns.y);
-        Self { problem, unknowns, auxiliary, objective }
-    }
-
-    /// Lᵢ of the gain that does not saturate.
-    fn low(&self) -> &[Expr] {
-        self.auxiliary.as_ref().unwrap_or(&self.unknowns.l)
-    }
-
-    /// Lᵢ of K_s, on the way from the low gain to R⁻¹BᵀP.
-    fn on_segment(&self, polytope: &Polytope, weights: &Weights, s: f64) -> Vec<Expr> {
-        let end = |i: usize| s * Expr::constant(&weights.r_inverse * polytope.b(i).transpose());
-        self.low().iter().enumerate().map(|(i, low)| (1.0 - s) * low + end(i)).collect()
-    }
-
-    /// Smallest eigenvalues of the performance inequality of mixtures of K_s and F at the vertices ([`Solution::mixtures`]).
-    fn mixtures(
-        &self,
-        polytope: &Polytope,
-        request: &PolytopicRequest,
-        weights: &Weights,
-        s: f64,
-        answer: &Answer,
-    ) -> Vec<(String, f64)> {
-        let sum = DoubleSum::new(polytope, &request.lyapunov, &self.unknowns.y);
-        let high = self.on_segment(polytope, weights, s);
-        listed_mixtures(polytope.inputs())
-            .into_iter()
-            .flat_map(|mixture| {
-                let rows = high.iter().zip(self.low());
-                let l: Vec<Expr> = rows.map(|(l, low)| super::high_gain::mixture(mixture, l, low)).collect();
-                let name = format!("mixture {mixture:0inputs$b}", inputs = polytope.inputs());
-                sum.performance_at_vertices(&name, &l, weights)
-            })
-            .map(|(name, block)| (name, smallest_eigenvalue(&answer.value(&block))))
-            .collect()
-    }
-}
-
-/// The performance inequalities of a gain `l`, or of every mixture of it with `low`.
-fn performance(sum: &DoubleSum, low: Option<&[Expr]>, l: &[Expr], weights: &Weights) -> Vec<(String, Expr)> {
-    let Some(low) = low else { return sum.performance("performance", l, weights) };
-    let inputs = l[0].nrows();
-    let of_mixture = |vertex: usize| {
-        let mixed: Vec<Expr> = l.iter().zip(low).map(|(l, m)| super::high_gain::mixture(vertex, l, m)).collect();
-        sum.performance(&format!("performance of mixture {vertex:0inputs$b}"), &mixed, weights)
-    };
-    (0..1usize << inputs).flat_map(of_mixture).collect()
-}
-
-/// Theorems 2.1, 4.3, 4.4, 5.1-5.4.
-///
-/// Whatever the weights and bounds, there is a solution if and only if the system can be stabilised by the same Lyapunov function:
-/// for T(Y, L) ≻ 0, (εY, εL) satisfies ε T − ε²(YQY + LᵀRL) ≻ 0 and ε ℓᵢY⁻¹ℓᵢᵀ < σᵢ²/γ for small ε > 0, and the first block of each
-/// inequality is T. Where it cannot, Y → 0 in some direction comes as near to a solution as one likes; the solver then stops short
-/// without a witness, and the stabilisation's is taken.
-fn regulate(
-    polytope: &Polytope,
-    request: &PolytopicRequest,
-    cost: &CostWeights,
-    where_stalled: WhereStalled,
-) -> Result<PolytopicDesign, SynthesisError> {
-    let weights = Weights::new(cost).expect("weights are checked to be semidefinite and definite");
-    let posed = RegulatorProblem::new(polytope, request, cost, &weights);
-    let RegulatorProblem { problem, unknowns, auxiliary, objective } = &posed;
-    let answer = problem.solve(&solver())?;
-    let mut seems_unstabilizable = None;
-    let contradicts = matches!(answer.outcome, Outcome::Infeasible(_) | Outcome::InfeasibleWithin(_));
-    if where_stalled == WhereStalled::Refute && (contradicts || matches!(answer.outcome, Outcome::Inaccurate(_))) {
-        // whether there is a solution is all that is asked
-        let stabilization = stabilize(polytope, &PolytopicRequest { back_off: BackOff::Nothing, ..request.clone() })?;
-        if stabilization.is_infeasible() {
-            return Ok(stabilization);
-        }
-        seems_unstabilizable = stabilization.unstabilizable;
-    }
-    // the least cost from every state at once, so that there is an optimum, which is attained
-    let is_regulator = polytope.len() == 1 && request.saturation.is_none();
-    let is_riccati = is_regulator && matches!(request.objective, Objective::Trace);
-    let mut undetectable = None;
-    if is_riccati {
-        match riccati::solve(polytope.a(0), polytope.b(0), &cost.q, &cost.r) {
-            Ok(regulator) => {
-                if let Some(design) = by_riccati(polytope, cost, problem, &answer, &regulator)? {
-                    return Ok(design);
-                }
-            }
-            // that the objective has no bound follows for a pair that is stabilisable
-            Err(RiccatiError::Unweighted(mode))
-                if stabilizability(polytope.a(0), polytope.b(0)) == Stabilizability::Stabilizable =>
-            {
-                undetectable = Some(mode);
-            }
-            Err(_) => {}
-        }
-    }
-    let is_attained = is_regulator && answer.outcome.is_feasible();
-    let back_off = if is_attained && request.back_off == BackOff::Knee { BackOff::Nothing } else { request.back_off };
-    let lqr =
-        |i: usize| riccati::solve(polytope.a(i), polytope.b(i), &cost.q, &cost.r).ok().map(|regulator| regulator.k);
-    // the knee alone asks for it
-    let reference: Vec<Mat<f64>> = match back_off {
-        BackOff::Knee => (0..polytope.len()).map(lqr).collect::<Option<_>>().unwrap_or_default(),
-        _ => Vec::new(),
-    };
-    let stage = Stage {
-        problem,
-        objective,
-        least: f64::NEG_INFINITY,
-        l: posed.low(),
-        y: &unknowns.y,
-        r_inverse: &weights.r_inverse,
-        q: inverse_spd(&cost.q).map(|_| &cost.q),
-        ladder: &COST_LADDER,
-        reference: &reference,
-    };
-    let moderated = stage.moderate(answer, back_off, &solver())?;
-    let mut design = finish(problem, moderated, unknowns, auxiliary.as_deref())?;
-    design.withdraw_infeasible(polytope);
-    (design.undetectable, design.unstabilizable) = (undetectable, seems_unstabilizable);
-    let (Some(solution), Some(high_gain)) = (&mut design.solution, request.high_gain) else { return Ok(design) };
-    let low = solution.auxiliary_gain.take().unwrap_or_else(|| solution.gain.clone());
-    let mut s = choose(polytope, cost, &solution.p, &low, &high_gain)?;
-    // with a general R the inequalities decide; s = 0 satisfies them, so halving ends
-    if auxiliary.is_some() {
-        let sum = DoubleSum::new(polytope, &request.lyapunov, &unknowns.y);
-        let holds = |s: f64| {
-            let l = posed.on_segment(polytope, &weights, s);
-            let blocks = performance(&sum, auxiliary.as_deref(), &l, &weights);
-            blocks.iter().all(|(_, block)| inverse_spd(&design.answer.value(block)).is_some())
-        };
-        let mut halvings = 0;
-        while s > 0.0 && !holds(s) {
-            s = if halvings < 60 { 0.5 * s } else { 0.0 };
-            halvings += 1;
-        }
-    }
-    let high = posed.on_segment(polytope, &weights, s);
-    solution.l = high.iter().map(|l| design.answer.value(l)).collect();
-    solution.gain = solution.l.iter().zip(&solution.p).map(|(l, p)| l * p).collect();
-    solution.auxiliary_gain = Some(low);
-    solution.s = Some(s);
-    solution.mixtures = posed.mixtures(polytope, request, &weights, s, &design.answer);
-    Ok(design)
-}
-
-/// Inputs up to which all mixtures are listed.
-const MOST_LISTED_INPUTS: usize = 10;
-
-/// The mixtures of a design that are listed: all 2^m of few inputs; of more, whose R is diagonal so that all follow, F and K_s themselves.
-fn listed_mixtures(inputs: usize) -> Vec<usize> {
-    match inputs <= MOST_LISTED_INPUTS {
-        true => (0..1 << inputs).collect(),
-        false => vec![0, usize::MAX >> (usize::BITS as usize - inputs)],
-    }
-}
-
-/// What is added to a solution of the Riccati equation: the least that is tried, relatively, the factor from one to the next, and how many.
-const STRICT: (f64, f64, i32) = (1e-14, 10.0, 12);
-
-/// P + εX of [`riccati::strict`], with Y, L and their proved inequalities.
-struct Strict {
-    epsilon: f64,
-    p: Mat<f64>,
-    y: Mat<f64>,
-    l: Mat<f64>,
-    blocks: Vec<BlockReport>,
-}
-
-/// Theorem 2.1 by the Riccati equation, whose gain is right to rounding where the solver's has half the digits of its gap: the P of least ε
-/// that is proved to satisfy the inequalities of `problem`. With an unobserved motion that decays the optimum is not attained; the gain is that of the optimum all the same.
-fn by_riccati(
-    polytope: &Polytope,
-    cost: &CostWeights,
-    problem: &Problem,
-    answer: &Answer,
-    regulator: &Regulator,
-) -> Result<Option<PolytopicDesign>, SynthesisError> {
-    let (a, b) = (polytope.a(0), polytope.b(0));
-    let at = |step: i32| -> Result<Option<Strict>, SynthesisError> {
-        let epsilon = STRICT.0 * STRICT.1.powi(step);
-        let Some(p) = riccati::strict((a, b), (&cost.q, &cost.r), regulator, epsilon) else { return Ok(None) };
-        let Some(y) = inverse_spd(&p) else { return Ok(None) };
-        let l = &regulator.k * &y;
-        let blocks = problem.verify(&[y.clone(), l.clone()])?;
-        let holds = blocks.iter().all(|block| block.verified_lower_bound > 0.0);
-        Ok(holds.then_some(Strict { epsilon, p, y, l, blocks }))
-    };
-    for step in 0..STRICT.2 {
-        let Some(least) = at(step)? else { continue };
-        // one more, so that it does not hold by the last digit
-        let Strict { epsilon, p, y, l, blocks } = at(step + 1)?.unwrap_or(least);
-        let mut answer = answer.clone();
-        (answer.objective, answer.blocks) = (trace(&y), blocks);
-        let solution = Solution {
-            y: vec![y],
-            l: vec![l],
-            p: vec![p],
-            gain: vec![regulator.k.clone()],
-            auxiliary_gain: None,
-            s: None,
-            mixtures: Vec::new(),
-        };
-        return Ok(Some(PolytopicDesign {
-            riccati: Some(epsilon),
-            solution: Some(solution),
-            ..PolytopicDesign::without_solution(answer)
-        }));
-    }
-    Ok(None)
-}
-
-/// The least s of all vertices, each by the rule of [`Segment`].
-fn choose(
-    polytope: &Polytope,
-    cost: &CostWeights,
-    p: &[Mat<f64>],
-    low: &[Mat<f64>],
-    high_gain: &HighGain,
-) -> Result<f64, SynthesisError> {
-    let at = |i: usize| {
-        let model = polytope.vertex(i);
-        Segment::between(&model, cost, &p[i], &low[i]).choose(&model, cost, high_gain.sample_time_s, &high_gain.options)
-    };
-    (0..polytope.len()).map(at).try_fold(f64::INFINITY, |least, s| Ok(least.min(s?)))
 }
 
 /// The Yᵢ without repetition.

@@ -13,13 +13,15 @@
 //!
 //! uᵀRu ≤ τV and V ≤ ν xᵀQx, so that τν bounds the gain itself, uᵀRu/xᵀQx; where that is large, the least ν is taken with a little more than
 //! the least τ: P ⪯ νQ. Both sides are quadratic in x, so that the measure has no unit of its own: it is the same for every scale of states, inputs and
-//! time. Of a high gain it is the low gain F that is kept small; K is then the chosen share of the way to R⁻¹BᵀP.
+//! time. Of stabilisation, which has no cost, Q is the I that its margin is measured by, and R weighs every input by the square of its column of B, so that the unit of an
+//! input does not matter. Of a high gain it is the low gain F that is kept small; K is then the chosen share of the way to R⁻¹BᵀP.
 //!
 //! At its optimum the second problem rests on its boundary as the first does. What is returned is (Y, L)/(1 + ε): for
 //! W(P) = P(A − BK) + (A − BK)ᵀP + Q + KᵀRK ⪯ 0, W((1 + ε)P) = (1 + ε)W(P) − ε(Q + KᵀRK), and |kx| ≤ σ on V ≤ γ becomes strict, which
 //! pays for the rounding of K and P: by that of P alone kP⁻¹kᵀ moves by a share of cond(P) units in the last place. ε is a part of β.
 
 use super::objective::{COST_BOUND, MARGIN, Posed};
+use super::trade_off::largest_effort;
 use crate::math::Mat;
 use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::matrix::{inverse_spd, semidefinite_factor};
@@ -88,9 +90,11 @@ pub(super) struct Stage<'a> {
     pub l: &'a [Expr],
     /// Yᵢ
     pub y: &'a [Expr],
+    /// How many of the Yᵢ differ: so many unknowns come first, and then the Lᵢ.
+    pub distinct: usize,
     /// R⁻¹ ≻ 0
     pub r_inverse: &'a Mat<f64>,
-    /// Q, where there is one and it is definite.
+    /// Q, where it is definite.
     pub q: Option<&'a Mat<f64>>,
     /// The shares that are tried, ascending.
     pub ladder: &'a [f64],
@@ -173,8 +177,23 @@ impl Stage<'_> {
             point.outcome.is_optimal() || matches!(point.outcome, Outcome::Inaccurate(_)) && point.objective.is_finite()
         };
         // of a solver that stopped short by rounding what is made strict may well be proved
-        let moved = |point: &Answer| self.problem.moved(first, self.strict(point, strictness(share)));
-        Ok(points.iter().filter(has_point).find_map(moved))
+        let strict: Vec<Vec<Mat<f64>>> =
+            points.iter().filter(has_point).map(|point| self.strict(point, strictness(share))).collect();
+        let moved = |values: &Vec<Mat<f64>>| self.problem.moved(first, values.clone());
+        // what is proved later is P and K as they are rounded
+        let survives =
+            |values: &&Vec<Mat<f64>>| self.rounded(values).as_ref().is_some_and(|values| moved(values).is_some());
+        Ok(strict.iter().filter(survives).find_map(moved).or_else(|| strict.iter().rev().find_map(moved)))
+    }
+
+    /// Y and L as they are read back from P = Y⁻¹ and K = LY⁻¹ in doubles; `None` where Y is not definite.
+    fn rounded(&self, values: &[Mat<f64>]) -> Option<Vec<Mat<f64>>> {
+        let (distinct, count) = (self.distinct, self.y.len());
+        let p: Vec<Mat<f64>> = values[..distinct].iter().map(inverse_spd).collect::<Option<_>>()?;
+        let y: Vec<Mat<f64>> = p.iter().map(inverse_spd).collect::<Option<_>>()?;
+        let at = |i: usize| if distinct == 1 { 0 } else { i };
+        let l = (0..count).map(|i| &values[distinct + i] * &p[at(i)] * &y[at(i)]);
+        Some(y.iter().cloned().chain(l).chain(values[distinct + count..].iter().cloned()).collect())
     }
 
     /// The unknowns of the first stage at a point of the second: (Y, L)/(1 + ε), t(1 + ε) of a cost bound, and t/(1 + ε)² of a margin of stability.
@@ -254,14 +273,7 @@ impl Stage<'_> {
 
     /// √λ_max(R^½ Kᵢ Yᵢ Kᵢᵀ R^½) with the Yᵢ of `measure`, the largest of all vertices; zero for no gains.
     fn effort_of(&self, gains: &[Mat<f64>], measure: &Answer) -> f64 {
-        let Some(root) = inverse_spd(self.r_inverse).and_then(|r| semidefinite_factor(&r)) else {
-            return f64::INFINITY;
-        };
-        let at = |(k, y): (&Mat<f64>, &Expr)| {
-            let weighted = root.transpose() * k;
-            let effort = &weighted * measure.value(y) * weighted.transpose();
-            symmetric_eigenvalues(&effort).into_iter().fold(0.0, f64::max).sqrt()
-        };
-        gains.iter().zip(self.y).map(at).fold(0.0, f64::max)
+        let y: Vec<Mat<f64>> = self.y.iter().map(|y| measure.value(y)).collect();
+        largest_effort(gains, &y, self.r_inverse)
     }
 }

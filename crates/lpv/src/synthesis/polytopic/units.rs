@@ -1,15 +1,15 @@
 //! Units in which the numbers of a problem are about 1.
 //!
 //! A plant in nanometres, a Q in 10¹⁵ and a clock in microseconds state the same problem as one in metres, 1 and seconds, and have to get the same
-//! design. So it is posed in units of its own, with time in 1/ω, inputs in β and costs in κ:
+//! design. So it is posed in units of its own, with time in 1/ω, inputs in the diagonal β and costs in κ:
 //!
 //! ```text
-//! A′ = A/ω,   B′ = βB/ω,   Q′ = Q/κ,   R′ = β²R/κ,   σ′ = σ/(β√(γω/κ)),   γ′ = 1,
-//! Y = Y′ω/κ,   L = L′βω/κ,   K = βK′,   P = P′κ/ω.
+//! A′ = A/ω,   B′ = Bβ/ω,   Q′ = Q/κ,   R′ = βRβ/κ,   σ′ = σ/(β√(γω/κ)),   γ′ = 1,
+//! Y = Y′ω/κ,   L = βL′ω/κ,   K = βK′,   P = P′κ/ω.
 //! ```
 //!
-//! States of an objective are in units of their largest entry. Otherwise a unit of states is none of its own: x in aξ has B/a, a²Q, that is another β and κ. ω = max|A|, κ = max|Q| and β² = κ/max|R| make the largest entries of
-//! A′, Q′ and R′ one. They follow every change of units, and the primed numbers are rounded to 32 bits, so that what the solver sees, and where it goes,
+//! States of an objective are in units of their largest entry. Otherwise a unit of states is none of its own: x in aξ has B/a, a²Q, that is another β and κ. ω = max|A|, κ = max|Q| and βⱼ² = κ/Rⱼⱼ make the largest entries of
+//! A′ and Q′ and the diagonal of R′ one; without a cost Y has its trace, κ = ω, and βⱼ makes that of every column of B′ one. They follow every change of units, and the primed numbers are rounded to 32 bits, so that what the solver sees, and where it goes,
 //! is the same to the last bit whatever the units were. (The design of least effort is often far from unique, and a last bit would choose among them.)
 //! Of rounded numbers nothing is proved: what is found is proved again as it was stated. The regulator of one vertex, which is the Riccati solution, is
 //! not rounded.
@@ -20,10 +20,10 @@ use crate::model::Polytope;
 use crate::synthesis::CostWeights;
 
 /// ω, β and κ.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Units {
     rate: f64,
-    input: f64,
+    inputs: Vec<f64>,
     cost: f64,
     /// Without a cost, Y is of trace n whatever the units.
     has_cost: bool,
@@ -35,30 +35,38 @@ impl Units {
     /// Those of a problem; `None` where its numbers give no unit.
     pub fn of(polytope: &Polytope, request: &PolytopicRequest) -> Option<Self> {
         let is_regulator = polytope.len() == 1 && request.weights.is_some() && request.saturation.is_none();
-        let is_rounded = !is_regulator;
-        let largest = |matrix: &dyn Fn(usize) -> f64| (0..polytope.len()).map(matrix).fold(0.0, f64::max);
-        let (a, b) = (largest(&|i| polytope.a(i).norm_max()), largest(&|i| polytope.b(i).norm_max()));
-        let units = match &request.weights {
+        let largest = |size: &dyn Fn(usize) -> f64| (0..polytope.len()).map(size).fold(0.0, f64::max);
+        let speed = largest(&|i| polytope.a(i).norm_max());
+        let column =
+            |j: usize| largest(&|i| (0..polytope.states()).map(|k| polytope.b(i)[(k, j)].abs()).fold(0.0, f64::max));
+        let inputs = 0..polytope.inputs();
+        let (rate, inputs, cost) = match &request.weights {
             Some(CostWeights { q, r }) => {
                 let cost = q.norm_max();
-                let input = (cost / r.norm_max()).sqrt();
-                Self { rate: if a > 0.0 { a } else { input * b }, input, cost, has_cost: true, is_rounded }
+                let inputs: Vec<f64> = inputs.map(|j| (cost / r[(j, j)]).sqrt()).collect();
+                let pull = inputs.iter().enumerate().map(|(j, unit)| unit * column(j)).fold(0.0, f64::max);
+                (if speed > 0.0 { speed } else { pull }, inputs, cost)
             }
             None => {
-                let rate = if a > 0.0 { a } else { b };
-                Self { rate, input: rate / b, cost: 1.0, has_cost: false, is_rounded }
+                let rate = if speed > 0.0 { speed } else { inputs.clone().map(column).fold(0.0, f64::max) };
+                // an input that moves nothing has no unit
+                let unit = |j: usize| if column(j) > 0.0 { rate / column(j) } else { 1.0 };
+                (rate, inputs.map(unit).collect(), 1.0)
             }
         };
-        let is_unit = |unit: f64| (LEAST..=1.0 / LEAST).contains(&unit);
-        let all = [units.rate, units.input, units.cost];
-        all.into_iter().all(is_unit).then_some(units)
+        let has_size = inputs.iter().chain([&rate, &cost]).all(|unit| (LEAST..=1.0 / LEAST).contains(unit));
+        let has_cost = request.weights.is_some();
+        has_size.then_some(Self { rate, inputs, cost, has_cost, is_rounded: !is_regulator })
     }
 
     /// (A′, B′)
     pub fn polytope(&self, polytope: &Polytope) -> Polytope {
         let each = |of: &dyn Fn(usize) -> Mat<f64>| (0..polytope.len()).map(of).collect();
         let a = each(&|i| self.matrix(polytope.a(i), 1.0 / self.rate));
-        let b = each(&|i| self.matrix(polytope.b(i), self.input / self.rate));
+        let b = each(&|i| {
+            let b = polytope.b(i);
+            Mat::from_fn(b.nrows(), b.ncols(), |k, j| self.number(b[(k, j)] * (self.inputs[j] / self.rate)))
+        });
         Polytope::new(a, b).expect("the same sizes")
     }
 
@@ -66,7 +74,9 @@ impl Units {
     pub fn request(&self, request: &PolytopicRequest) -> PolytopicRequest {
         let weights = request.weights.as_ref().map(|CostWeights { q, r }| CostWeights {
             q: self.matrix(q, 1.0 / self.cost),
-            r: self.matrix(r, self.input * self.input / self.cost),
+            r: Mat::from_fn(r.nrows(), r.ncols(), |i, j| {
+                self.number(r[(i, j)] * (self.inputs[i] * self.inputs[j] / self.cost))
+            }),
         });
         let primed = |rate: &f64| self.number(rate / self.rate);
         let lyapunov = match &request.lyapunov {
@@ -77,8 +87,9 @@ impl Units {
         };
         // what binds is the limit on {V ≤ 1}
         let saturation = request.saturation.as_ref().map(|bounds| {
-            let size = self.input * (bounds.gamma * self.y()).sqrt();
-            InputBounds { sigma: bounds.sigma.iter().map(|sigma| self.number(sigma / size)).collect(), gamma: 1.0 }
+            let size = (bounds.gamma * self.y()).sqrt();
+            let primed = |(sigma, unit): (&f64, &f64)| self.number(sigma / (unit * size));
+            InputBounds { sigma: bounds.sigma.iter().zip(&self.inputs).map(primed).collect(), gamma: 1.0 }
         });
         let mut high_gain = request.high_gain;
         if let Some(time) = high_gain.as_mut().and_then(|high_gain| high_gain.sample_time_s.as_mut()) {
@@ -101,14 +112,14 @@ impl Units {
         if self.has_cost { self.rate / self.cost } else { 1.0 }
     }
 
-    /// By how much L is larger than L′.
-    pub fn l(&self) -> f64 {
-        self.input * self.y()
+    /// L of L′.
+    pub fn l(&self, l: &Mat<f64>) -> Mat<f64> {
+        Mat::from_fn(l.nrows(), l.ncols(), |i, j| self.inputs[i] * self.y() * l[(i, j)])
     }
 
-    /// By how much K is larger than K′.
-    pub fn gain(&self) -> f64 {
-        self.input
+    /// K of K′.
+    pub fn gain(&self, gain: &Mat<f64>) -> Mat<f64> {
+        Mat::from_fn(gain.nrows(), gain.ncols(), |i, j| self.inputs[i] * gain[(i, j)])
     }
 
     /// By how much the objective is larger: of tr Y as Y, of a cost bound as P, of a margin of stability as ω.
