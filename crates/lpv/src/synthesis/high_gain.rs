@@ -25,6 +25,7 @@
 use super::back_off::mixtures_hold;
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
 use super::slpvqr::{self, not_definite};
+use super::units::{Units, scaled};
 use super::{CostWeights, FrozenDesign, RateBounded, SynthesisError};
 use crate::math::eigen::spectral_radius;
 use crate::math::hold::discretize;
@@ -86,6 +87,28 @@ pub(super) fn segment(
         let FrozenDesign { rho, gain, p, trace_y, iterations, .. } = low;
         return Ok(Segment { rho, low: gain, high, trace_y, p, p_rate: None, iterations });
     }
+    if let Some(units) = Units::of(&[(&model.a, &model.b)], Some(weights), true)
+        && let (own, limits) = (units.model(model), units.limits(sigma, gamma))
+        && let Ok(segment) = of_mixtures(&own, &units.weights(weights), &limits, 1.0)
+    {
+        return Ok(Segment {
+            p: scaled(&segment.p, 1.0 / units.y()),
+            low: units.gain(&segment.low),
+            high: units.gain(&segment.high),
+            trace_y: units.y() * segment.trace_y,
+            ..segment
+        });
+    }
+    of_mixtures(model, weights, sigma, gamma)
+}
+
+/// All 2^m mixtures, as the problem stands, whatever the size of its numbers.
+fn of_mixtures(
+    model: &FrozenModel,
+    weights: &CostWeights,
+    sigma: &[f64],
+    gamma: f64,
+) -> Result<Segment, SynthesisError> {
     let (n, inputs) = (model.a.nrows(), model.b.ncols());
     let inverse = InverseWeights::new(weights);
     let mut problem = Problem::new();

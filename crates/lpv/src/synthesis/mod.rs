@@ -32,6 +32,7 @@ mod region;
 mod slpvqr;
 mod supervision;
 mod supervision_validation;
+mod units;
 mod validation;
 
 pub use design::{CostWeights, Design, DesignRequest, FrozenDesign, Method, ScheduleKind, design};

@@ -13,6 +13,7 @@
 //! grid; what lies between its points is for the certificate to prove.
 
 use super::inequality::{InverseWeights, performance_with_rate, solve, unsaturated};
+use super::units::{Units, largest_entry, scaled};
 use super::{CostWeights, SynthesisError};
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, symmetric_part};
@@ -95,6 +96,34 @@ const DIRECTION_SLACK: f64 = 1.001;
 /// # Errors
 /// Infeasible, unbounded or inaccurate.
 pub(super) fn solve_on_grid(
+    grid: &[FrozenModel],
+    options: &RateBoundedOptions,
+    basis: &[BasisFunction],
+    weights: &CostWeights,
+    saturation: Option<(&[f64], f64)>,
+) -> Result<(RateBounded, usize), SynthesisError> {
+    let models: Vec<(&Mat<f64>, &Mat<f64>)> = grid.iter().map(|model| (&model.a, &model.b)).collect();
+    if let Some(units) = Units::of(&models, Some(weights), true) {
+        let own: Vec<FrozenModel> = grid.iter().map(|model| units.model(model)).collect();
+        let limits = saturation.map(|(sigma, gamma)| units.limits(sigma, gamma));
+        let direction = options.direction.as_ref().map(|direction| {
+            let largest = largest_entry(direction);
+            direction.iter().map(|x| units.number(x / largest)).collect()
+        });
+        let primed = RateBoundedOptions { rate: units.per_time(options.rate), direction, ..options.clone() };
+        let found =
+            in_its_units(&own, &primed, basis, &units.weights(weights), limits.as_deref().map(|sigma| (sigma, 1.0)));
+        if let Ok((RateBounded { mut y, mut l, .. }, iterations)) = found {
+            y.coefficients.iter_mut().for_each(|y| *y = scaled(y, units.y()));
+            l.iter_mut().flat_map(|l| &mut l.coefficients).for_each(|l| *l = units.l(l));
+            return Ok((RateBounded { rate: options.rate, y, l }, iterations));
+        }
+    }
+    in_its_units(grid, options, basis, weights, saturation)
+}
+
+/// The problem as it stands, whatever the size of its numbers.
+fn in_its_units(
     grid: &[FrozenModel],
     options: &RateBoundedOptions,
     basis: &[BasisFunction],

@@ -1,6 +1,7 @@
 //! SLPVQR: the quadratic regulator under input saturation, low gain, Theorem 5.3 (Theorem 5.1 without parameter).
 
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
+use super::units::{Units, scaled};
 use super::{CostWeights, FrozenDesign, SynthesisError};
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
 use crate::model::FrozenModel;
@@ -9,6 +10,28 @@ use lmi::Problem;
 /// Theorem 5.3 at one parameter value: the largest tr Y such that u = −Kx meets the cost bound xᵀPx and does not
 /// saturate, |kᵢx| ≤ σᵢ, on the ellipsoid xᵀPx ≤ γ.
 pub(super) fn frozen(
+    model: &FrozenModel,
+    weights: &CostWeights,
+    sigma: &[f64],
+    gamma: f64,
+) -> Result<FrozenDesign, SynthesisError> {
+    // an error, and what is refuted, is told of the problem as it is stated
+    if let Some(units) = Units::of(&[(&model.a, &model.b)], Some(weights), true)
+        && let (own, limits) = (units.model(model), units.limits(sigma, gamma))
+        && let Ok(design) = in_its_units(&own, &units.weights(weights), &limits, 1.0)
+    {
+        return Ok(FrozenDesign {
+            gain: units.gain(&design.gain),
+            p: scaled(&design.p, 1.0 / units.y()),
+            trace_y: units.y() * design.trace_y,
+            ..design
+        });
+    }
+    in_its_units(model, weights, sigma, gamma)
+}
+
+/// The problem as it stands, whatever the size of its numbers.
+fn in_its_units(
     model: &FrozenModel,
     weights: &CostWeights,
     sigma: &[f64],

@@ -19,6 +19,7 @@
 mod inequality;
 mod moderation;
 mod objective;
+mod primed;
 mod rates;
 mod regulation;
 mod restatement;
@@ -26,7 +27,6 @@ mod separation;
 mod stabilization;
 mod theorem;
 mod trade_off;
-mod units;
 mod unstabilizable;
 
 pub use moderation::{BackOff, Moderation};
@@ -37,6 +37,7 @@ pub use theorem::Theorem;
 pub use trade_off::{TradeOff, TradeOffPoint};
 pub use unstabilizable::UnstabilizablePoint;
 
+use super::units::Units;
 use super::{CostWeights, HighGainOptions, SynthesisError};
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, symmetric_part};
@@ -48,7 +49,6 @@ use moderation::Moderated;
 use regulation::{Regulation, WhereStalled};
 use stabilization::Stabilization;
 use std::cell::OnceCell;
-use units::Units;
 
 /// The Lyapunov function xᵀY(ρ)⁻¹x.
 #[derive(Clone, Debug, PartialEq)]
@@ -242,9 +242,9 @@ impl FirstStage {
     /// If sizes of weights, bounds, rates or objective do not fit the polytope; for a high gain of more than 10 inputs with a general R, or of
     /// more than 64.
     pub fn new(polytope: &Polytope, request: &PolytopicRequest) -> Result<Self, SynthesisError> {
-        let own = match Units::of(polytope, request) {
+        let own = match primed::units(polytope, request) {
             Some(units) => {
-                let optimum = Optimum::new(&units.polytope(polytope), &units.request(request))?;
+                let optimum = Optimum::new(&primed::polytope(&units, polytope), &primed::request(&units, request))?;
                 Some((units, optimum))
             }
             None => None,
@@ -289,7 +289,7 @@ impl FirstStage {
         Ok(match &self.own {
             Some((units, optimum)) => {
                 let answer = optimum.answer();
-                (units.objective(&self.request.objective) * answer.objective, answer.outcome.is_optimal())
+                (primed::objective_factor(units, &self.request) * answer.objective, answer.outcome.is_optimal())
             }
             None => {
                 let answer = self.stated()?.answer();

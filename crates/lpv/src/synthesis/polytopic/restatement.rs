@@ -2,12 +2,13 @@
 
 use super::inequality::Weights;
 use super::objective::{COST_BOUND, MARGIN};
+use super::primed::objective_factor;
 use super::regulation::RegulatorProblem;
 use super::stabilization::StabilityProblem;
-use super::units::{Units, scaled};
 use super::{PolytopicDesign, PolytopicRequest, Solution};
 use crate::math::Mat;
 use crate::model::Polytope;
+use crate::synthesis::units::{Units, scaled};
 use lmi::{Answer, Problem};
 
 /// `design`, found in `units`, as one of `polytope` and `request`; `None` where it is not solved, or is not proved as stated.
@@ -19,7 +20,7 @@ pub(super) fn restated(
 ) -> Option<PolytopicDesign> {
     let solution = design.solution.as_ref().filter(|_| design.is_solved())?;
     let mut restated = in_units(solution, units);
-    let objective = units.objective(&request.objective);
+    let objective = objective_factor(units, request);
     let answer = match &request.weights {
         None => {
             let StabilityProblem { problem, .. } = StabilityProblem::new(polytope, &request.lyapunov);
