@@ -115,7 +115,7 @@ impl TradeOffCurve {
             is_cost_bound: report.is_cost_bound,
             objective_is,
             chosen,
-            chosen_by: if plan.back_off == BackOff::Knee { "the knee" } else { "back_off of the file" },
+            chosen_by: if plan.back_off == BackOff::Knee { "the knee" } else { "as the file asks" },
             points,
         })
     }

@@ -25,7 +25,7 @@
 use super::back_off::mixtures_hold;
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
 use super::slpvqr::{self, not_definite};
-use super::units::{Units, scaled};
+use super::units::{STRICT, Units, scaled};
 use super::{CostWeights, FrozenDesign, RateBounded, SynthesisError};
 use crate::math::eigen::spectral_radius;
 use crate::math::hold::discretize;
@@ -92,10 +92,10 @@ pub(super) fn segment(
         && let Ok(segment) = of_mixtures(&own, &units.weights(weights), &limits, 1.0)
     {
         return Ok(Segment {
-            p: scaled(&segment.p, 1.0 / units.y()),
+            p: scaled(&segment.p, (1.0 + STRICT) / units.y()),
             low: units.gain(&segment.low),
             high: units.gain(&segment.high),
-            trace_y: units.y() * segment.trace_y,
+            trace_y: units.y() * segment.trace_y / (1.0 + STRICT),
             ..segment
         });
     }

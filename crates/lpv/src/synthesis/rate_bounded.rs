@@ -13,7 +13,7 @@
 //! grid; what lies between its points is for the certificate to prove.
 
 use super::inequality::{InverseWeights, performance_with_rate, solve, unsaturated};
-use super::units::{Units, largest_entry, scaled};
+use super::units::{STRICT, Units, largest_entry, scaled};
 use super::{CostWeights, SynthesisError};
 use crate::math::Mat;
 use crate::math::matrix::{inverse_spd, symmetric_part};
@@ -116,7 +116,9 @@ pub(super) fn solve_on_grid(
         if let Ok((RateBounded { mut y, mut l, .. }, iterations)) = found {
             y.coefficients.iter_mut().for_each(|y| *y = scaled(y, units.y()));
             l.iter_mut().flat_map(|l| &mut l.coefficients).for_each(|l| *l = units.l(l));
-            return Ok((RateBounded { rate: options.rate, y, l }, iterations));
+            let mut strict = RateBounded { rate: options.rate, y, l };
+            strict.back_off(1.0 + STRICT);
+            return Ok((strict, iterations));
         }
     }
     in_its_units(grid, options, basis, weights, saturation)

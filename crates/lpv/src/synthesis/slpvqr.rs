@@ -1,7 +1,7 @@
 //! SLPVQR: the quadratic regulator under input saturation, low gain, Theorem 5.3 (Theorem 5.1 without parameter).
 
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
-use super::units::{Units, scaled};
+use super::units::{STRICT, Units, scaled};
 use super::{CostWeights, FrozenDesign, SynthesisError};
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
 use crate::model::FrozenModel;
@@ -22,8 +22,8 @@ pub(super) fn frozen(
     {
         return Ok(FrozenDesign {
             gain: units.gain(&design.gain),
-            p: scaled(&design.p, 1.0 / units.y()),
-            trace_y: units.y() * design.trace_y,
+            p: scaled(&design.p, (1.0 + STRICT) / units.y()),
+            trace_y: units.y() * design.trace_y / (1.0 + STRICT),
             ..design
         });
     }

@@ -132,6 +132,9 @@ pub(super) fn largest_entry<'a>(entries: impl IntoIterator<Item = &'a f64>) -> f
     if largest > 0.0 { largest } else { 1.0 }
 }
 
+/// ε of P(1 + ε), the least that makes an optimum found for rounded numbers one that holds for those of the problem.
+pub(super) const STRICT: f64 = 1e-7;
+
 /// Smallest unit: products and quotients of a few are no overflow.
 const LEAST: f64 = 1e-60;
 

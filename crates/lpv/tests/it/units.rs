@@ -2,6 +2,7 @@
 //! whose answer has K̂ = bK/a. By powers of two to the last bit, by other factors to 10⁻⁹.
 
 use crate::numbers::Numbers;
+use crate::quadrotor;
 use lpv::math::Mat;
 use lpv::math::matrix::diagonal;
 use lpv::model::Polytope;
@@ -9,7 +10,7 @@ use lpv::synthesis::polytopic::{
     BackOff, HighGain, InputBounds, Lyapunov, Objective, PolytopicDesign, PolytopicRequest, rate_box_vertices,
     synthesize,
 };
-use lpv::synthesis::{CostWeights, HighGainOptions};
+use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method, RateBoundedOptions, ScheduleKind, design};
 
 /// a, b, s and q.
 #[derive(Clone, Copy, Debug)]
@@ -181,6 +182,38 @@ fn what_is_proved_is_proved_as_stated() {
                 let least = (1.0 - moderation.back_off) * moderation.optimum;
                 objective >= least * (1.0 - 2e-7) && objective <= moderation.optimum * (1.0 + 1e-6)
             }));
+        }
+    }
+}
+
+/// The gains of the thesis's quadrotor do not depend on the size of its weights, for a yaw at rest and for one that turns.
+#[test]
+fn weights_of_a_grid_have_no_size() {
+    let designed = |cost: f64, high_gain: bool, rate_bounded: Option<RateBoundedOptions>| {
+        let CostWeights { q, r } = quadrotor::weights();
+        let gamma = 20.0 * cost;
+        let request = DesignRequest {
+            name: "one".into(),
+            method: match high_gain {
+                true => Method::HighGainSlpvqr { gamma, high_gain: HighGainOptions::default() },
+                false => Method::Slpvqr { gamma },
+            },
+            weights: CostWeights { q: times(&q, cost), r: times(&r, cost) },
+            grid_points: 4,
+            schedule: ScheduleKind::Grid,
+            limits: quadrotor::limits(),
+            sample_time_s: 0.002,
+            rate_bounded,
+        };
+        let design = design(&quadrotor::spec(9.807), &*quadrotor::plant(), &request, &|_| {}).unwrap();
+        design.points.iter().map(|point| point.gain.clone()).collect::<Vec<_>>()
+    };
+    let moving = RateBoundedOptions { rate: 2.0, order: 1, direction: None };
+    for (high_gain, rate_bounded) in [(false, None), (true, None), (false, Some(moving))] {
+        let expected = designed(1.0, high_gain, rate_bounded.clone());
+        for cost in [1e6, 1e-15] {
+            let difference = difference(&expected, &designed(cost, high_gain, rate_bounded.clone()));
+            assert!(difference < 1e-9, "{high_gain} {rate_bounded:?} {cost:e}: {difference:e}");
         }
     }
 }
