@@ -1,9 +1,9 @@
 //! The control law: what runs at every sample.
 
-use super::certified_set::SetEvaluator;
+use super::certified_set::{CertifiedSet, SetEvaluator};
+use super::feedback::Controller;
 use super::governor::{GovernorState, Sample};
 use super::nested::{Active, select};
-use super::{CertifiedSet, Controller};
 use crate::plant::Description;
 
 /// A controller with its state and work space.

@@ -1,6 +1,6 @@
 //! The continuous-time extended Kalman filter, thesis algorithm 2.1, (2.48)-(2.62).
 
-use super::NoiseCovariance;
+use super::noise_covariance::NoiseCovariance;
 use crate::math::Mat;
 use crate::math::angle::wrap;
 use crate::math::matrix::{from_row_slice, inverse_spd, to_row_vec};

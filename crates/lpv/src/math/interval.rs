@@ -6,8 +6,8 @@
 //! mode. An operation without a meaning, such as division by an interval that holds zero, or one whose result is not finite,
 //! gives the whole line.
 
-use super::scalar::Scalar;
-use super::sinc::sinc_and_derivatives;
+mod scalar;
+
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A closed interval [lo, hi].
@@ -277,9 +277,9 @@ impl Mul<f64> for Interval {
     }
 }
 
-impl Scalar for Interval {
-    /// By the mean value theorem of second order around the middle m: sin(m + δ) ∈ sin m + δ cos m + [−δ²/2, δ²/2].
-    fn sin_cos(self) -> (Self, Self) {
+impl Interval {
+    /// Enclosures of sine and cosine, by the mean value theorem of second order around the middle m: sin(m + δ) ∈ sin m + δ cos m + [−δ²/2, δ²/2].
+    pub fn sin_cos(self) -> (Self, Self) {
         let unit = Self { lo: -1.0, hi: 1.0 };
         let middle = self.middle();
         let delta = self - middle;
@@ -294,10 +294,6 @@ impl Scalar for Interval {
         let bend = Self { lo: -half, hi: half };
         let within = |x: Self| Self { lo: x.lo.clamp(-1.0, 1.0), hi: x.hi.clamp(-1.0, 1.0) };
         (within(sin + delta * cos + bend), within(cos - delta * sin + bend))
-    }
-
-    fn sinc(self) -> Self {
-        sinc_and_derivatives(self)[0]
     }
 }
 

@@ -4,7 +4,6 @@
 //! the mean value theorem of second order gives each of them from its values at m.
 
 use super::interval::Interval;
-use super::scalar::Scalar;
 
 /// Up to this magnitude the power series are taken, beyond it sin and cos.
 const SERIES: f64 = 1.0;

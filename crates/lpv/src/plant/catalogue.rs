@@ -1,8 +1,11 @@
 //! The plants that a file can name, each with its parameters.
 
+use super::double_integrator::DoubleIntegrator;
+use super::equations::Plant;
 use super::linear::{Linear, LinearParameters};
-use super::quadrotor::QuadrotorParameters;
-use super::{DoubleIntegrator, Pendulum, Plant, Quadrotor};
+use super::parameter_error::PlantParameterError;
+use super::pendulum::Pendulum;
+use super::quadrotor::{Quadrotor, QuadrotorParameters};
 use serde::{Deserialize, Serialize};
 
 /// A plant by name, with its parameters: plain data that a design carries so that it can be checked again later.
@@ -17,37 +20,6 @@ pub enum PlantSpec {
     DoubleIntegrator {},
     /// [`Linear`]
     Linear(LinearParameters),
-}
-
-/// A plant parameter that makes no plant.
-#[derive(Debug, thiserror::Error, PartialEq)]
-pub enum PlantParameterError {
-    /// A physical parameter that is not positive and finite.
-    #[error("{parameter} is {value}: it has to be a positive, finite number")]
-    NotPositive {
-        /// Which parameter.
-        parameter: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// A matrix of the wrong size.
-    #[error("{matrix} is {rows} × {columns}: it has to be {expected}")]
-    Shape {
-        /// Which matrix.
-        matrix: &'static str,
-        /// Its rows.
-        rows: usize,
-        /// Its columns; of the first row that differs from the others, if one does.
-        columns: usize,
-        /// What is allowed.
-        expected: String,
-    },
-    /// A matrix with a non-finite entry.
-    #[error("{matrix} has an entry that is not finite")]
-    NotFinite {
-        /// Which matrix.
-        matrix: &'static str,
-    },
 }
 
 impl PlantSpec {

@@ -4,7 +4,8 @@
 //! [m, m x_α b; m x_α b, I_α] [ḧ; α̈] + [c_h ḣ; c_α α̇] + [k_h h; k_α(α) α] = [−L; M],
 //! L = ρU²b (c_lα e + c_lβ β), M = ρU²b² (c_mα e + c_mβ β), e = α + ḣ/U + (½ − a) b α̇/U.
 
-use super::{ConstantError, LiteratureParameter};
+use super::constant::ConstantError;
+use super::parameter::LiteratureParameter;
 use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 

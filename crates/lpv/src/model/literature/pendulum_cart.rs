@@ -2,7 +2,8 @@
 //!
 //! (M + m) r̈ + m l (θ̈ cos θ − θ̇² sin θ) = u and (4/3) l θ̈ + r̈ cos θ = g sin θ.
 
-use super::{ConstantError, LiteratureParameter};
+use super::constant::ConstantError;
+use super::parameter::LiteratureParameter;
 use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_3;

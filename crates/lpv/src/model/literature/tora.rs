@@ -2,7 +2,8 @@
 //!
 //! ẍ₁ + x₁ = ε(θ̇² sin θ − θ̈ cos θ) and θ̈ + ε ẍ₁ cos θ = u.
 
-use super::{ConstantError, LiteratureParameter};
+use super::constant::ConstantError;
+use super::parameter::LiteratureParameter;
 use crate::math::scalar::Scalar;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_4;

@@ -4,9 +4,10 @@
 //! simplex T around them (or products of intervals, for a box), and the simplex is what distinguishes SN, SNNN, NO, CNO, INO
 //! and INO-RNO.
 
+use super::error::TensorProductError;
 use super::minimum_volume::minimum_volume;
+use super::sampling::ParameterGrid;
 use super::simplex::{column_maxima, column_minima, inscribed, log_determinant, regular, relaxed, scaled, touching};
-use super::{ParameterGrid, TensorProductError};
 use crate::math::Mat;
 use crate::math::hosvd::right_singular;
 use crate::math::matrix::{inverse, rows};
