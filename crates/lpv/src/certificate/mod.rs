@@ -18,10 +18,11 @@ pub use claim::{Claim, ClaimId, ClaimKind, Member, Motion, Of, Subject, Verdict,
 pub use excursion::{Excursion, excursion};
 pub use inequality::{BlockMargin, block_margins};
 pub use lyapunov::{LyapunovFunction, unsaturated_level};
+pub use proof::record::{Record, RecordError};
 pub use proof::{
     COST_INFLATION, MOST_CELLS, MotionProof, NonlinearProof, PolytopicClaim, PolytopicLyapunov, ProofOptions, Proofs,
-    Record, RecordError, SampledCost, ScheduledClaim, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic,
-    prove_sampled_cost, prove_scheduled,
+    SampledCost, ScheduledClaim, Unprovable, lyapunov_matrix, prove, prove_gain, prove_polytopic, prove_sampled_cost,
+    prove_scheduled,
 };
 pub use rest::{Unrest, rests_exactly, unrest};
 pub use stability::{StabilityMargin, frozen_stability};

@@ -1,6 +1,7 @@
 //! The closed LPV loop and its Lyapunov function over the continuous range of the parameter, as enclosures on cells.
 
 use super::matrix::{CellMatrix, TaylorMatrix};
+use super::place::Place;
 use super::rowwise::{self, Balanced, Rows, mixed, multipliers, shares};
 use crate::certificate::claim::Motion;
 use crate::controller::{InputLimits, Schedule};
@@ -82,15 +83,6 @@ pub(super) enum Row {
     Limited(usize),
     /// The unit vector of state `i`.
     State(usize),
-}
-
-/// A cell: |t − middle| ≤ half within [piece, piece + 1], of one variant of a claim (mixture of rows, input).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    pub piece: usize,
-    pub variant: usize,
-    pub middle: f64,
-    pub half: f64,
 }
 
 /// The three parts of the decrease on a cell: κ(constant + ρ̇ rate) + c cost ≻ 0 is V̇ < −(c/κ)(xᵀQx + uᵀRu).

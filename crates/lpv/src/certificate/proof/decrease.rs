@@ -3,10 +3,12 @@
 //! Where inputs may saturate the condition by rows comes first (`rowwise.rs`). It is sufficient; where it does not prove, a few inputs are
 //! tried by all mixtures of their rows. A mixture that fails in the middle of the place where the rows did spares that.
 
-use super::closed_loop::{ByRows, ClosedLoop, Decrease, Place};
+use super::cells::{Attempt, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH};
+use super::closed_loop::{ByRows, ClosedLoop, Decrease};
 use super::matrix::{CellMatrix, Definiteness};
+use super::place::Place;
 use super::rowwise::{ALL_HIGH, separable};
-use super::{Attempt, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH, RATE_RATIO, RATES};
+use super::sought::{RATE_RATIO, RATES};
 use crate::math::Mat;
 use crate::mutant;
 

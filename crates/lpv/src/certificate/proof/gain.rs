@@ -1,8 +1,8 @@
 //! The bounded-real inequality over the whole range of its parameter, between grid points too.
 
-use super::closed_loop::Place;
+use super::cells::{Attempt, Cells, LEAST_HALF};
 use super::matrix::{CellMatrix, TaylorMatrix};
-use super::{Attempt, Cells, LEAST_HALF};
+use super::place::Place;
 use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Words};
 use crate::math::decimal::{about, at_least};
 use crate::math::interval::Interval;

@@ -122,6 +122,12 @@ impl TaylorMatrix {
     }
 }
 
+/// The middles of the entries.
+pub(super) fn middle(matrix: &TaylorMatrix) -> Mat<f64> {
+    let (rows, columns) = matrix.shape();
+    Mat::from_fn(rows, columns, |i, j| matrix.at(i, j).value.middle())
+}
+
 /// Values and derivatives of a matrix of Taylor forms.
 struct TaylorParts {
     value: Enclosed,

@@ -18,8 +18,8 @@
 //! |w| < q y^{3/2} √γ / (2κ).
 //! ```
 
-use super::COST_INFLATION_RATE_BOUNDED;
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::sought::COST_INFLATION_RATE_BOUNDED;
 use crate::certificate::claim::{Claim, ClaimKind, Of, Verdict, Words};
 use crate::controller::{Governor, Motion};
 use crate::math::Mat;

@@ -16,10 +16,12 @@
 //! The inputs are taken along the right singular vectors of B, the columns of M, along which the equations decouple: four
 //! rotors that tilt the thrust do so by their sum. M is rounded, so that B_ΔS = (B_ΔM)(MᵀS) + B_Δ(I − MMᵀ)S.
 
-use super::closed_loop::{ClosedLoop, Decrease, Parts, Place, Row};
+use super::cells::{Attempt, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH};
+use super::closed_loop::{ClosedLoop, Decrease, Parts, Row};
 use super::difference::{Balance, Difference};
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use super::{Attempt, COST_INFLATION, Cells, LEAST_HALF, LEAST_HALF_OF_SEARCH};
+use super::place::Place;
+use super::sought::COST_INFLATION;
 use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Words};
 use crate::math::Mat;
 use crate::math::decimal::at_most;

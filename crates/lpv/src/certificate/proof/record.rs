@@ -10,12 +10,16 @@
 
 mod sha256;
 
-use super::closed_loop::{ByRows, ClosedLoop, Form, Place, Row};
+use super::cells::{Attempt, Cells, LEAST_HALF};
+use super::closed_loop::Unprovable;
+use super::closed_loop::{ByRows, ClosedLoop, Form, Row};
 use super::decrease::{DecreaseProof, Found};
 use super::matrix::CellMatrix;
+use super::place::Place;
 use super::polytopic::{PolytopicClaim, PolytopicLyapunov};
+use super::proofs::Proofs;
+use super::sampled_constant;
 use super::sampled_saturated::{self, SaturatedCell, Times};
-use super::{Attempt, Cells, LEAST_HALF, Proofs, Unprovable, sampled_constant};
 use crate::certificate::{Claim, ClaimKind, Motion, Of, SupervisedProofs, Verdict};
 use crate::math::Mat;
 use crate::math::eigen::smallest_eigenvalue;
@@ -322,7 +326,7 @@ fn of_design(design: &Design, closed_loop: &ClosedLoop) -> Result<Map<String, Va
 }
 
 /// The cells of one group: without gaps, each ends where the next one begins.
-fn group<M>(cells: &[super::Cell<M>], more: impl Fn(&M, &mut Vec<Value>)) -> Vec<Value> {
+fn group<M>(cells: &[super::cells::Cell<M>], more: impl Fn(&M, &mut Vec<Value>)) -> Vec<Value> {
     let begin = |k: usize| match cells.get(k).map(|cell| cell.place) {
         None => cells[0].place.piece as f64 + 1.0,
         Some(place) if k == 0 => place.piece as f64,
@@ -337,7 +341,7 @@ fn group<M>(cells: &[super::Cell<M>], more: impl Fn(&M, &mut Vec<Value>)) -> Vec
 }
 
 fn groups<M>(cells: &Cells<M>, variant: impl Fn(&Place) -> Value, more: impl Fn(&M, &mut Vec<Value>)) -> Vec<Value> {
-    let of_group = |cells: &Vec<super::Cell<M>>| {
+    let of_group = |cells: &Vec<super::cells::Cell<M>>| {
         let place = cells[0].place;
         json!({"piece": place.piece, "variant": variant(&place), "cells": group(cells, &more)})
     };

@@ -137,7 +137,7 @@ impl Rows {
 
     /// The values in the middle, as numbers.
     pub fn middle(&self) -> [Mat<f64>; 2] {
-        [&self.gradient, &self.difference].map(super::witness::middle)
+        [&self.gradient, &self.difference].map(super::matrix::middle)
     }
 }
 

@@ -1,10 +1,11 @@
 //! The sampled loop with one matrix X for all of a cell, which a record can hold: with −(EᵀX + XE + TEᵀXE) ≻ 0 and X ≻ 0 every
 //! eigenvalue of I + TE is inside the unit circle. Simpler to check than what `sampled` does, and not as sharp.
 
-use super::closed_loop::{ClosedLoop, Place};
+use super::cells::{Attempt, Cells, LEAST_HALF};
+use super::closed_loop::ClosedLoop;
 use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
-use super::sampled::{decrease, increment};
-use super::{Attempt, Cells, LEAST_HALF};
+use super::place::Place;
+use super::sampled_loop::{decrease, increment};
 use crate::math::Mat;
 use crate::math::hold::discretize;
 use crate::math::interval::Interval;

@@ -24,12 +24,13 @@
 //!
 //! All of it is computed in coordinates of the state and units of the inputs that are balanced by powers of two, which is exact.
 
+use super::claims::{definite, unsaturated, words};
+use super::closed_loop::Unprovable;
 use super::closed_loop::{ClosedLoop, Form};
-use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::matrix::{CellMatrix, Definiteness, TaylorMatrix, middle as middle_of};
 use super::rowwise::mixed;
-use super::sampled::hold;
-use super::witness::middle as middle_of;
-use super::{Unprovable, definite, unsaturated, weights, words};
+use super::sampled_loop::hold;
+use super::weights;
 use crate::certificate::claim::{Claim, ClaimKind, Of, Verdict, Words, settle};
 use crate::math::Mat;
 use crate::math::balance::balance;

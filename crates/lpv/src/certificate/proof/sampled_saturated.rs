@@ -28,13 +28,13 @@
 //!
 //! None of this depends on the level: it is the one up to which F does not saturate.
 
-use super::closed_loop::{ClosedLoop, Form, Place};
-use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::cells::{Attempt, Cells, LEAST_HALF};
+use super::closed_loop::{ClosedLoop, Form};
+use super::matrix::{CellMatrix, Definiteness, TaylorMatrix, middle as middle_of};
+use super::place::Place;
 use super::rowwise::{Balanced, Rows, multipliers, shares};
-use super::sampled::{hold, rest};
+use super::sampled_loop::{hold, rest};
 use super::sampled_witness::leaves_when_sampled;
-use super::witness::middle as middle_of;
-use super::{Attempt, Cells, LEAST_HALF};
 use crate::certificate::claim::{Claim, ClaimKind, Verdict, Words};
 use crate::math::Mat;
 use crate::math::interval::Interval;

@@ -7,10 +7,11 @@
 //!   the eigenvector that numbers give.
 //! - A state that the loop leaves where it is, Ax = 0 and Kx = 0, refutes.
 
-use super::closed_loop::{ClosedLoop, Place};
-use super::matrix::TaylorMatrix;
-use super::sampled::{decrease, increment, scaling};
-use super::witness::{form, is_positive, middle, values};
+use super::closed_loop::ClosedLoop;
+use super::matrix::{TaylorMatrix, middle};
+use super::place::Place;
+use super::sampled_loop::{decrease, increment, scaling};
+use super::witness::{form, is_positive, values};
 use crate::certificate::claim::Witness;
 use crate::math::Mat;
 use crate::math::ball::BallMatrix;

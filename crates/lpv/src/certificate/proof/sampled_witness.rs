@@ -7,10 +7,10 @@
 //! set or on a kink. From eigenvectors of JᵀPJ against P, x ← √γ P⁻¹g/√(gᵀP⁻¹g) with the gradient g = JᵀPx₊ climbs along the edge (the
 //! maximum of the linear form gᵀx); and every state that is met is also tried where it comes to a limit.
 
-use super::Place;
 use super::closed_loop::{ClosedLoop, Form};
 use super::matrix::TaylorMatrix;
-use super::sampled::hold;
+use super::place::Place;
+use super::sampled_loop::hold;
 use super::witness::{form, image, inverse, values};
 use crate::certificate::claim::Witness;
 use crate::math::Mat;

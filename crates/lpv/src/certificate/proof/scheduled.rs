@@ -18,11 +18,10 @@
 //! the plant from every state of that set.
 
 use super::interpolated::Scheduled;
-use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::matrix::{self, CellMatrix, Definiteness, TaylorMatrix};
 use super::mean_value::{BoxCell, BoxOutcome, MeanValueMatrix, prove_on_box};
 use super::polytopic::{PolytopicClaim, PolytopicLyapunov};
 use super::rowwise::{Balanced, Rows, mixed, multipliers, separable, shares};
-use super::witness;
 use crate::certificate::claim::{Claim, ClaimKind, Motion, Of, Verdict, Words, settle};
 use crate::math::Mat;
 use crate::math::decimal::{Rounding, about, at_least, decimal};
@@ -343,7 +342,7 @@ impl<'a> BoxLoop<'a> {
         let middle: Vec<Taylor> = cell.middle().into_iter().map(|c| Taylor::constant(Interval::point(c))).collect();
         let (base, rows) = parts(&middle);
         let [gradient, difference] = rows.middle();
-        let multipliers = multipliers(&[Balanced { base: witness::middle(&base), gradient, difference }]);
+        let multipliers = multipliers(&[Balanced { base: matrix::middle(&base), gradient, difference }]);
         let (moving, shares) = (self.moving(saturating), shares(&multipliers));
         MeanValueMatrix::new(cell, &|rho| {
             let (base, rows) = parts(rho);
@@ -443,7 +442,7 @@ impl<'a> BoxLoop<'a> {
                 matches!(CellMatrix::new(&matrix, &matrix).is_positive(0.0), Definiteness::Proved(_))
             })
         };
-        let widest = inverse_spd(&witness::middle(&self.p))
+        let widest = inverse_spd(&matrix::middle(&self.p))
             .map(|y| states.iter().map(|&(i, r)| r * r / y[(i, i)]).fold(f64::INFINITY, f64::min))
             .filter(|widest| widest.is_normal() && *widest > 0.0);
         let asked = level.unwrap_or(f64::INFINITY);

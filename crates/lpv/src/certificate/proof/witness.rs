@@ -12,9 +12,10 @@
 //!   Every finite horizon's cost matrix X_T has A_cᵀX_T + X_T A_c + W = ΦᵀWΦ ⪰ 0, stable or not; a little less than it is taken.
 //! - **The loop is not stable** if A_cᵀZ + ZA_c ≺ 0 while zᵀZz < 0 for some z: the motion from z keeps xᵀZx below zᵀZz.
 
-use super::Attempt;
-use super::closed_loop::{ClosedLoop, Form, Place};
-use super::matrix::{CellMatrix, Definiteness, TaylorMatrix};
+use super::cells::Attempt;
+use super::closed_loop::{ClosedLoop, Form};
+use super::matrix::{CellMatrix, Definiteness, TaylorMatrix, middle};
+use super::place::Place;
 use crate::certificate::claim::Witness;
 use crate::math::Mat;
 use crate::math::eigen::{smallest_eigenvector, spectral_abscissa, symmetric_eigenvectors};
@@ -143,12 +144,6 @@ fn finite_horizons(a: &Mat<f64>, w: &Mat<f64>) -> Vec<Mat<f64>> {
         horizons.push(x.clone());
     }
     horizons
-}
-
-/// The middles of the entries.
-pub(super) fn middle(matrix: &TaylorMatrix) -> Mat<f64> {
-    let (rows, columns) = matrix.shape();
-    Mat::from_fn(rows, columns, |i, j| matrix.at(i, j).value.middle())
 }
 
 /// The values alone, as constants.
