@@ -1,8 +1,9 @@
 //! A flight that costs more than is proved of the plant as it flies: a defect of the program, if it is no error of the integration.
 
 use crate::failure::Failure;
-use crate::flights::{Certified, Flown, ROUNDING, cost_of_step, step_bounds};
+use crate::flown::{Certified, Flown, ROUNDING, cost_of_step};
 use crate::scenario::{ControllerPlan, Scenario};
+use crate::step_bounds::step_bounds;
 use lpv::math::decimal::{at_least, at_most};
 use lpv::sim::{Simulation, performance};
 

@@ -1,7 +1,7 @@
 //! The program `lpv`: from a nonlinear plant to a checked gain-scheduled controller and its flight.
 //!
 //! Each subcommand is a file; what several share is beside them:
-//! `scenario`, `problem` and `tp` read TOML, `designs` runs synthesis and checks, `flights` simulates, `contradiction` holds flights against what is proved, `report` and `record` write results,
+//! `scenario`, `problem` and `tp` read TOML, `designs` runs synthesis and checks, `flights` simulates, `flown` and `step_bounds` say what is known of a flight, `contradiction` holds flights against what is proved, `report` and `record` write results,
 //! `table` lays them out, `output` prints, `folder` keeps results whole, `failure` is every way to end that is not success.
 
 mod certify;
@@ -11,6 +11,7 @@ mod designs;
 mod failure;
 mod figure;
 mod flights;
+mod flown;
 mod folder;
 mod output;
 mod problem;
@@ -22,6 +23,7 @@ mod scenario;
 mod sdp;
 mod simulate;
 mod stay;
+mod step_bounds;
 mod table;
 mod thesis;
 mod tp;

@@ -1,31 +1,34 @@
 //! Problem files of `lpv design`: an LPV model as matrices or a plant by name, weights, and a method with its settings.
 //! Everything that can be wrong with a file is met here.
 
+mod curve;
 mod file;
 pub mod gain;
 mod model;
 mod objective;
+mod plan;
 mod solve;
 mod source;
 mod stages;
 pub mod trade_off;
 mod transformed;
+mod values;
 mod verdict;
 
-use crate::certify::polytopic::Transformed;
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::{file as scenario_file, weights};
+pub use curve::solve_with_trade_off;
 use file::{DesignTable, LyapunovName, MethodName, ModelTable, ObjectiveName, ProblemFile};
-use lpv::math::Mat;
-use lpv::math::matrix::{from_rows, is_diagonal};
-use lpv::model::FrozenModel;
+use lpv::math::matrix::is_diagonal;
 use lpv::synthesis::polytopic::{BackOff, HighGain, InputBounds, Lyapunov, Objective, rate_box_vertices};
 use lpv::synthesis::{CostWeights, HighGainOptions};
 use model::models;
 use objective::{initial, objective};
-pub use solve::{SOLVED, solve, solve_with_trade_off};
+pub use plan::{Initial, ProblemPlan, Scope};
+pub use solve::solve;
 use std::path::Path;
+use values::SUM_TOLERANCE;
 
 /// Vertices of a polytope; each pair of them is an inequality for each rate vertex.
 const MOST_VERTICES: usize = 64;
@@ -37,55 +40,6 @@ const MOST_STATES: usize = 60;
 const MOST_COUPLED_INPUTS: usize = 10;
 /// Inputs of a high-gain design with diagonal R, whose mixtures follow from one inequality.
 const MOST_HIGH_GAIN_INPUTS: usize = 64;
-/// Convex weights sum to one, and rates to zero, up to this.
-const SUM_TOLERANCE: f64 = 1e-9;
-
-/// A problem, ready to solve.
-pub struct ProblemPlan {
-    /// What the vertices or grid points are called in the answer.
-    pub places: Vec<String>,
-    /// Names of the states, where the plant has them.
-    pub states: Vec<String>,
-    /// Of a tensor-product model: its weights, and the LPV model that it stands for.
-    pub transformed: Option<Transformed>,
-    /// The models: vertices, or points of a frozen design.
-    pub models: Vec<FrozenModel>,
-    /// How they are used.
-    pub scope: Scope,
-    /// Q and R; `None` for stabilisation.
-    pub weights: Option<CostWeights>,
-    /// σ and γ.
-    pub saturation: Option<InputBounds>,
-    /// Choice of a high gain.
-    pub high_gain: Option<HighGain>,
-    /// What is optimised.
-    pub objective: Objective,
-    /// How much of the optimum is given back for a gain that can be applied.
-    pub back_off: BackOff,
-    /// The objective is the reach along its states.
-    pub region: bool,
-    /// State whose cost is bounded, with the model (for frozen designs) or the weights of its parameter.
-    pub initial: Option<Initial>,
-}
-
-/// An initial state and where the parameter starts.
-pub struct Initial {
-    /// x(0)
-    pub state: Vec<f64>,
-    /// Convex weights of ρ(0) over the vertices; `None`: P does not depend on it.
-    pub parameter: Option<Vec<f64>>,
-    /// The model at ρ(0), of a frozen design.
-    pub model: Option<FrozenModel>,
-}
-
-/// What the Lyapunov function is for.
-pub enum Scope {
-    /// The polytope of the models.
-    Polytope(Lyapunov),
-    /// Each model by itself.
-    Frozen,
-}
-
 impl ProblemPlan {
     /// Whether the text of a file is a problem rather than a scenario: it has a table `[design]`.
     pub fn is_problem(text: &str) -> bool {
@@ -194,34 +148,6 @@ fn lyapunov(door: &Door, design: &DesignTable, model: &ModelTable, has_plant: bo
     Ok(lyapunov)
 }
 
-/// A matrix of finite numbers from its rows.
-fn matrix(door: &Door, key: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>, Failure> {
-    let width = rows.first().map_or(0, Vec::len);
-    if width == 0 {
-        return door.refuse(key, "is empty: give rows of numbers");
-    }
-    if let Some(row) = rows.iter().position(|row| row.len() != width) {
-        return door.refuse(key, format!("row {} has {} numbers, and row 1 has {width}", row + 1, rows[row].len()));
-    }
-    if rows.iter().flatten().any(|entry| !entry.is_finite()) {
-        return door.refuse(key, "has an entry that is not finite");
-    }
-    Ok(from_rows(rows))
-}
-
-fn convex_weights(door: &Door, key: &str, weights: &[f64], count: usize) -> Result<(), Failure> {
-    if weights.len() != count {
-        return door.refuse(key, format!("has {} numbers: the model has {count} vertices", weights.len()));
-    }
-    let sum: f64 = weights.iter().sum();
-    match weights.iter().all(|&weight| weight >= 0.0) && (sum - 1.0).abs() <= SUM_TOLERANCE {
-        true => Ok(()),
-        false => {
-            door.refuse(key, format!("is {weights:?}: the weights of the vertices are zero or more and sum to one"))
-        }
-    }
-}
-
 fn cost_weights(
     door: &Door,
     table: Option<file::WeightsTable>,
@@ -323,13 +249,6 @@ fn back_off(door: &Door, share: Option<f64>) -> Result<BackOff, Failure> {
             door.refuse("design.back_off", format!("is {share}: it has to be {message}"))
         }
     }
-}
-
-fn state(door: &Door, key: &str, x: &[f64], n: usize) -> Result<(), Failure> {
-    if x.len() != n {
-        return door.refuse(key, format!("has {} numbers: the model has {n} states", x.len()));
-    }
-    x.iter().try_for_each(|&value| door.finite(key, value).map(|_| ()))
 }
 
 fn state_like(door: &Door, key: &str, values: &[f64], count: usize) -> Result<(), Failure> {

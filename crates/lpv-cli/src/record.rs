@@ -2,7 +2,7 @@
 
 use crate::designs::{CheckedDesign, Undesigned};
 use crate::failure::Failure;
-use crate::flights::Flown;
+use crate::flown::Flown;
 use crate::scenario::Scenario;
 use crate::stay::StepStay;
 use lpv::certificate::{BoundOf, Claim, StepBound, Verdict};

@@ -2,9 +2,10 @@
 
 use crate::designs::{CheckedDesign, Undesigned, file_name};
 use crate::failure::Failure;
-use crate::flights::{Flown, while_rate};
+use crate::flown::Flown;
 use crate::scenario::{ControllerPlan, Scenario};
 use crate::stay::StepStay;
+use crate::step_bounds::while_rate;
 use lpv::certificate::{BoundOf, Claim, ClaimKind, Member, Motion, Of, StepBound, Subject, UnmetCondition, Verdict};
 use lpv::math::decimal::{Rounding, at_most, decimal};
 use lpv::math::eigen::largest_singular_value;

@@ -3,11 +3,13 @@
 use crate::contradiction;
 use crate::designs::{self, CheckedDesign, Undesigned};
 use crate::failure::Failure;
-use crate::flights::{self, Certified};
+use crate::flights;
+use crate::flown::Certified;
 use crate::folder::ResultFolder;
 use crate::output::{OutputArguments, print};
 use crate::record::{RunRecord, trajectory_csv, trajectory_file_name};
 use crate::scenario::Scenario;
+use crate::step_bounds;
 use crate::{report, table};
 use clap::Args;
 use lpv::certificate::Verdict;
@@ -50,7 +52,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut flown = flights::fly_all(&scenario, &certified);
     for (flown, proofs) in flown.iter_mut().zip(&proofs) {
         if let Some(proofs) = proofs {
-            flights::compare_with_proofs(&scenario, flown, proofs);
+            step_bounds::compare_with_proofs(&scenario, flown, proofs);
         }
     }
 

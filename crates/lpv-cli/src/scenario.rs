@@ -4,13 +4,15 @@
 mod controller;
 pub(crate) mod door;
 pub(crate) mod file;
+mod plan;
+mod request;
 mod set_point;
 mod supervision;
 pub(crate) mod weights;
 
 use crate::failure::Failure;
-use controller::{RequestDefaults, controller};
-use door::Door;
+use controller::controller;
+use door::{Door, file_name_part};
 use file::ScenarioFile;
 pub use file::engineers_words;
 use lpv::estimator::NoiseCovariance;
@@ -18,15 +20,15 @@ use lpv::math::stabilizability::{Stabilizability, stabilizability};
 use lpv::model::{GridModel, LpvModel};
 use lpv::plant::{Description, Plant, PlantSpec};
 use lpv::sim::{Reference, SetPoint};
-use lpv::synthesis::{CostWeights, DesignRequest, Supervision};
+use lpv::synthesis::CostWeights;
+pub use plan::ControllerPlan;
+use request::RequestDefaults;
 use set_point::{set_point, state_value};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Numbers that the flights of a scenario may keep in memory: 0.8 GB.
 const MOST_NUMBERS: f64 = 1e8;
-/// Characters of a name that becomes part of a file name; file systems allow 255.
-const LONGEST_NAME: usize = 100;
 /// Bytes of a file that is read: a design of thousands of grid points has tens of megabytes.
 const LARGEST_FILE: u64 = 1 << 28;
 
@@ -68,22 +70,6 @@ pub struct Scenario {
     pub noise: Option<NoiseCovariance>,
     /// The controllers, in file order.
     pub controllers: Vec<ControllerPlan>,
-}
-
-/// A controller to design and fly.
-pub struct ControllerPlan {
-    /// What the report calls it.
-    pub label: String,
-    /// What to design.
-    pub request: DesignRequest,
-    /// What is put around the design: nested certified sets, a reference governor.
-    pub supervision: Supervision,
-    /// Fly with noise.
-    pub noise: bool,
-    /// Feed back the estimate of an extended Kalman filter.
-    pub estimator: bool,
-    /// The verdict that the design has to reach, if any.
-    pub require: Option<lpv::certificate::Verdict>,
 }
 
 impl Scenario {
@@ -292,18 +278,6 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     String::from_utf8(bytes).map_err(|error| {
         unreadable(format!("is not a text file: byte {} is not UTF-8", error.utf8_error().valid_up_to() + 1))
     })
-}
-
-/// A name that becomes part of a file name.
-fn file_name_part(door: &Door, key: &str, name: &str) -> Result<(), Failure> {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    match (1..=LONGEST_NAME).contains(&name.len()) && name.chars().all(allowed) {
-        true => Ok(()),
-        false => door.refuse(
-            key,
-            format!("{name:?}: allowed are 1 to {LONGEST_NAME} letters, digits, - and _ (it becomes a file name)"),
-        ),
-    }
 }
 
 fn grid_points(door: &Door, count: usize, plant: &dyn Plant) -> Result<usize, Failure> {

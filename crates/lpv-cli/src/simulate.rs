@@ -3,7 +3,8 @@
 use crate::contradiction;
 use crate::designs;
 use crate::failure::Failure;
-use crate::flights::{self, Certified, Flown};
+use crate::flights;
+use crate::flown::{Certified, Flown};
 use crate::folder::ResultFolder;
 use crate::output::{OutputArguments, print};
 use crate::record::{trajectory_csv, trajectory_file_name};

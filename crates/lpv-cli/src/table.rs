@@ -1,7 +1,7 @@
 //! The table that ends a run.
 
 use crate::designs::{CheckedDesign, Undesigned};
-use crate::flights::Flown;
+use crate::flown::Flown;
 use crate::report::{bound_note, system_word};
 use crate::scenario::Scenario;
 use lpv::certificate::BoundOf;

@@ -2,7 +2,6 @@
 //! from elsewhere.
 
 use crate::failure::Failure;
-use crate::problem::SOLVED;
 use crate::scenario::door::Door;
 use crate::scenario::engineers_words;
 use lpv::certificate::{
@@ -24,6 +23,9 @@ type Rows = Vec<Vec<f64>>;
 const REPEATED: f64 = 1e-6;
 /// Relative size of what the sum of a rate vertex may be.
 const TOLERANCE: f64 = 1e-9;
+
+/// The status of a file whose design is one.
+pub const SOLVED: &str = "solved";
 
 /// The keys that a certificate reads; others, of the answer of `lpv design`, are let be.
 #[derive(Deserialize)]

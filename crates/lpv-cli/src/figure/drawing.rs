@@ -2,7 +2,9 @@
 
 use super::axis::span;
 use super::curve::simplify;
-use super::{Dash, Figure, Mark, Panel, STYLE, Style};
+use super::panel::{Mark, Panel};
+use super::sheet::Figure;
+use super::style::{Dash, STYLE, Style};
 use std::fmt::Write;
 
 /// Width of a drawing, and its measures, in pixels.
@@ -34,7 +36,14 @@ impl Frame {
     }
 }
 
-pub(super) fn draw(figure: &Figure, alone: bool) -> String {
+impl Figure {
+    /// The drawing. With `alone`, a file of its own with its style sheet; otherwise for a page that holds [`STYLE`].
+    pub fn svg(&self, alone: bool) -> String {
+        draw(self, alone)
+    }
+}
+
+fn draw(figure: &Figure, alone: bool) -> String {
     let rows = figure.panels.len().div_ceil(figure.columns);
     let cell = WIDTH / figure.columns as f64;
     let width = cell - LEFT - RIGHT;
@@ -51,8 +60,8 @@ pub(super) fn draw(figure: &Figure, alone: bool) -> String {
         "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"figure-drawing\" viewBox=\"0 0 {WIDTH} {total}\" width=\"{WIDTH}\" \
          height=\"{total}\" role=\"img\" aria-labelledby=\"title-{id} description-{id}\">\n<title id=\"title-{id}\">{}</title>\n\
          <desc id=\"description-{id}\">{}</desc>\n",
-        plain(&heading),
-        plain(&figure.caption)
+        escaped(&heading),
+        escaped(&figure.caption)
     );
     if alone {
         let _ = writeln!(svg, "<style>{STYLE}</style>\n<rect class=\"paper\" width=\"{WIDTH}\" height=\"{total}\"/>");
@@ -196,7 +205,7 @@ fn classes(style: Style) -> String {
 fn legend(entries: &[(String, Style)]) -> (String, f64) {
     let (mut svg, mut x, mut row) = (String::new(), LEFT, 0);
     for (label, style) in entries {
-        let width = 36.0 + 7.2 * plain(label).chars().count() as f64 + 18.0;
+        let width = 36.0 + 7.2 * escaped(label).chars().count() as f64 + 18.0;
         if x > LEFT && x + width > WIDTH {
             x = LEFT;
             row += 1;
@@ -225,14 +234,14 @@ fn round(value: f64) -> f64 {
     (10.0 * value).round() / 10.0
 }
 
-/// Text without markup, escaped.
-pub(super) fn plain(text: &str) -> String {
+/// Text for a page: without markup of its own.
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Text in which `_` makes the letters and digits after it an index.
 fn markup(text: &str) -> String {
-    let text = plain(text);
+    let text = escaped(text);
     let mut parts = text.split('_');
     let mut result = parts.next().unwrap_or_default().to_owned();
     for part in parts {

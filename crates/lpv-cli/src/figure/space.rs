@@ -1,6 +1,8 @@
 //! Paths in space, drawn in a panel by a parallel projection.
 
-use super::{Axis, Dash, Mark, Panel, Style};
+use super::axis::Axis;
+use super::panel::{Mark, Panel};
+use super::style::{Dash, Style};
 
 /// Seen from this azimuth and elevation, in degrees.
 const AZIMUTH_DEG: f64 = -58.0;

@@ -3,7 +3,7 @@
 use super::file::{LyapunovName, Matrices, ModelTable};
 use super::source::Source;
 use super::transformed::tensor_product_models;
-use super::{convex_weights, matrix};
+use super::values::{convex_weights, matrix};
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use crate::scenario::file as scenario_file;

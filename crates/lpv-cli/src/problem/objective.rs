@@ -1,9 +1,10 @@
 //! What a problem asks to be best, and from where: the objective and the initial state.
 
 use super::file::{DesignTable, LyapunovName, MethodName, ObjectiveName};
+use super::plan::Initial;
 use super::source::Source;
 use super::transformed::check_initial;
-use super::{Initial, convex_weights, matrix, state};
+use super::values::{convex_weights, matrix, state};
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use lpv::math::matrix::{inverse_spd, is_symmetric};

@@ -1,10 +1,10 @@
 //! A problem solved, and its answer as text and for machines.
 
+use super::plan::{ProblemPlan, Scope};
 use super::stages::{Stages, request};
 use super::trade_off::{TradeOffCurve, TradeOffRow};
 use super::verdict::{failure_at, verdict};
-use super::{ProblemPlan, Scope};
-use crate::certify::polytopic::{self, Transformed};
+use crate::certify::polytopic::{self, SOLVED, Transformed};
 use crate::failure::Failure;
 use crate::scenario::door::Door;
 use lmi::{Explanation, Outcome, Witness};
@@ -25,10 +25,8 @@ use std::path::Path;
 
 type Rows = Vec<Vec<f64>>;
 
-/// The word for a design that is one.
-pub const SOLVED: &str = "solved";
 /// The word where nothing is known.
-const INACCURATE: &str = "inaccurate";
+pub(super) const INACCURATE: &str = "inaccurate";
 
 /// What `lpv design PROBLEM.toml --json` prints.
 #[derive(Serialize)]
@@ -179,17 +177,8 @@ pub fn solve(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
     solve_from(&Stages::new(plan, path)?)
 }
 
-/// As [`solve`], with the curve of gain against optimum, where there is an optimum.
-pub fn solve_with_trade_off(plan: &ProblemPlan, path: &Path) -> Result<Report, Failure> {
-    let stages = Stages::new(plan, path)?;
-    let mut report = solve_from(&stages)?;
-    if matches!(report.status, SOLVED | INACCURATE) {
-        report.trade_off = Some(TradeOffCurve::new(&stages, &report)?);
-    }
-    Ok(report)
-}
-
-fn solve_from(stages: &Stages) -> Result<Report, Failure> {
+/// As [`solve`], from first stages that are solved.
+pub(super) fn solve_from(stages: &Stages) -> Result<Report, Failure> {
     let plan = stages.plan;
     let tried: &[BackOff] = if plan.back_off == BackOff::Knee { &PROVABLE } else { &[plan.back_off] };
     let (mut of_polytope, mut first) = (None, None);

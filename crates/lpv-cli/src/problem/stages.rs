@@ -1,7 +1,7 @@
 //! The first stages of a problem, solved once, and the designs that follow from them for every back-off.
 
+use super::plan::{ProblemPlan, Scope};
 use super::verdict::failure_at;
-use super::{ProblemPlan, Scope};
 use crate::failure::Failure;
 use lpv::model::{FrozenModel, Polytope};
 use lpv::synthesis::SynthesisError;

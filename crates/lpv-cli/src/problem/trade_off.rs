@@ -1,15 +1,13 @@
 //! `lpv design --trade-off`: what each share of the optimum that is given back buys, as a table, as data and as a picture.
 
-use super::solve::{Report, SOLVED, judged, objective};
-use super::stages::Stages;
-use super::verdict::failure_at;
-use super::{ProblemPlan, Scope};
+use super::plan::{ProblemPlan, Scope};
+use crate::certify::polytopic::SOLVED;
 use crate::failure::Failure;
 use crate::figure::{Axis, Dash, Figure, Panel, Style};
 use crate::scenario::door::Door;
 use lpv::certificate::Verdict;
 use lpv::math::decimal::{about, at_least, at_most};
-use lpv::synthesis::polytopic::{BackOff, FirstStage, Objective, PolytopicDesign, TradeOff};
+use lpv::synthesis::polytopic::Objective;
 use serde::Serialize;
 use std::path::Path;
 
@@ -25,7 +23,7 @@ pub struct TradeOffCurve {
     pub optimum_is_attained: bool,
     /// Whether the objective is a cost bound, the smaller the better.
     #[serde(skip)]
-    is_cost_bound: bool,
+    pub(super) is_cost_bound: bool,
     /// What the values of the objective are.
     pub objective_is: &'static str,
     /// The share that the design of the answer has given back; null where the answer holds no design.
@@ -54,7 +52,7 @@ pub struct TradeOffRow {
 }
 
 impl TradeOffRow {
-    fn without_design(back_off: f64) -> Self {
+    pub(super) fn without_design(back_off: f64) -> Self {
         let verdict = Verdict::Undecided;
         Self { back_off, status: "none", verdict, achieved: None, effort: None, largest_gain: None }
     }
@@ -84,42 +82,6 @@ pub fn refuse<T>(file: &Path, message: &str) -> Result<T, Failure> {
 }
 
 impl TradeOffCurve {
-    /// What an answer with `back_off` at each share would say, and `report`, the answer, at its own.
-    pub(super) fn new(stages: &Stages, report: &Report) -> Result<Self, Failure> {
-        let plan = stages.plan;
-        let chosen = report.chosen_share();
-        let mut shares = SHARES.to_vec();
-        if let Some(share) = chosen.filter(|share| !SHARES.contains(share)) {
-            shares.push(share);
-            shares.sort_by(f64::total_cmp);
-        }
-        let failed = |error| failure_at(plan, stages.path, error);
-        let curve = |stage: &FirstStage| stage.trade_off(&shares).map_err(failed);
-        let curves: Vec<TradeOff> = stages.each.iter().map(curve).collect::<Result<_, _>>()?;
-        let row = |(k, &share): (usize, &f64)| -> Result<TradeOffRow, Failure> {
-            if chosen == Some(share) {
-                return Ok(report.row(share));
-            }
-            let designs = curves.iter().map(|curve| curve.points[k].design.clone());
-            let Some(designs) = designs.collect::<Option<Vec<PolytopicDesign>>>() else {
-                return Ok(TradeOffRow::without_design(share));
-            };
-            let back_off = if share > 0.0 { BackOff::Share(share) } else { BackOff::Nothing };
-            Ok(judged(stages, designs, back_off)?.0.row(share))
-        };
-        let points = shares.iter().enumerate().map(row).collect::<Result<_, _>>()?;
-        let (optimum, objective_is) = objective(plan, curves.iter().map(|curve| curve.optimum));
-        Ok(Self {
-            optimum: optimum.unwrap_or(f64::NAN),
-            optimum_is_attained: curves.iter().all(|curve| curve.is_attained),
-            is_cost_bound: report.is_cost_bound,
-            objective_is,
-            chosen,
-            chosen_by: if plan.back_off == BackOff::Knee { "the knee" } else { "as the file asks" },
-            points,
-        })
-    }
-
     /// The table, as text.
     pub fn text(&self) -> String {
         let number = |value: Option<f64>| value.filter(|value| value.is_finite()).map_or("-".to_owned(), about);

@@ -1,6 +1,6 @@
 //! What a solved problem is worth, in words: verdicts with their reasons, and failures in the names of the file.
 
-use super::{ProblemPlan, Scope};
+use super::plan::{ProblemPlan, Scope};
 use crate::failure::Failure;
 use lmi::Outcome;
 use lpv::certificate::Verdict;

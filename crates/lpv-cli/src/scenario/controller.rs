@@ -1,33 +1,21 @@
 //! Controllers of a scenario: method, limits, how they are flown.
 
-use super::door::Door;
+use super::door::{Door, file_name_part};
 use super::file::{Bound, ControllerTable, LimitsTable, MethodName};
+use super::plan::ControllerPlan;
+use super::request::RequestDefaults;
 use super::set_point::state_value;
 use super::supervision::supervision;
-use super::{ControllerPlan, file_name_part};
 use crate::failure::Failure;
 use lpv::controller::InputLimits;
-use lpv::plant::{Description, Plant};
-use lpv::synthesis::{CostWeights, DesignRequest, HighGainOptions, Method, RateBoundedOptions};
+use lpv::plant::Description;
+use lpv::synthesis::{DesignRequest, HighGainOptions, Method, RateBoundedOptions};
 
 /// Inputs that the high-gain method is meant for: it poses 2^m inequalities.
 const MOST_HIGH_GAIN_INPUTS: usize = 10;
 /// Order of Y(ρ) of a design for a moving parameter: where the file says none, and at most.
 const LYAPUNOV_ORDER: u32 = 2;
 const MOST_LYAPUNOV_ORDER: u32 = 8;
-
-/// What every controller of a scenario shares.
-pub(super) struct RequestDefaults<'a> {
-    pub weights: &'a CostWeights,
-    pub grid_points: usize,
-    pub sample_time_s: f64,
-    pub limits: Option<&'a LimitsTable>,
-    pub plant: &'a dyn Plant,
-    pub description: &'a Description,
-    pub operating_input: &'a [f64],
-    /// States that set points move, with the number of the set point.
-    pub set_points: &'a [(usize, usize)],
-}
 
 /// Check a controller's table.
 pub(super) fn controller(

@@ -3,6 +3,9 @@
 use crate::failure::Failure;
 use std::path::Path;
 
+/// Characters of a name that becomes part of a file name; file systems allow 255.
+const LONGEST_NAME: usize = 100;
+
 /// The file that values are checked for: every refusal names it, the key, and what is allowed.
 pub(crate) struct Door<'a> {
     pub file: &'a Path,
@@ -25,5 +28,17 @@ impl Door<'_> {
             true => Ok(value),
             false => self.refuse(key, format!("is {value}: it has to be finite")),
         }
+    }
+}
+
+/// A name that becomes part of a file name.
+pub(super) fn file_name_part(door: &Door, key: &str, name: &str) -> Result<(), Failure> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    match (1..=LONGEST_NAME).contains(&name.len()) && name.chars().all(allowed) {
+        true => Ok(()),
+        false => door.refuse(
+            key,
+            format!("{name:?}: allowed are 1 to {LONGEST_NAME} letters, digits, - and _ (it becomes a file name)"),
+        ),
     }
 }

@@ -1,8 +1,8 @@
 //! Nested certified sets and the reference governor of a controller.
 
-use super::controller::RequestDefaults;
 use super::door::Door;
 use super::file::{ControllerTable, GovernorReference, GovernorTable};
+use super::request::RequestDefaults;
 use super::set_point::state_value;
 use crate::failure::Failure;
 use lpv::synthesis::{DesignRequest, GovernorOptions, Supervision, SupervisionError, governed_states, governor};
