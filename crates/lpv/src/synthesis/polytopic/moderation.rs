@@ -55,6 +55,8 @@ pub(super) const COST_LADDER: [f64; 4] = [1e-3, 1e-2, 5e-2, 1e-1];
 pub(super) const MARGIN_LADDER: [f64; 3] = [1e-2, 1e-1, 5e-1];
 /// The knee: the effort is at most this many times that of the largest share, or of the reference.
 const KNEE: f64 = 2.0;
+/// A design that takes this many times more effort than is enough, as its first rounds see it, is not worth solving for.
+const FAR_MORE: f64 = 1.5;
 /// √(uᵀRu/xᵀQx) from which a gain counts as large: then, with some room for the effort, V is kept small relative to the running cost.
 const LARGE_GAIN: f64 = 1e3;
 /// How much more than the least τ may then be taken.
@@ -124,7 +126,7 @@ impl Stage<'_> {
         // the largest share that the solver finds a design for, which rounding may keep it from
         let mut found = None;
         for (count, &share) in ladder.iter().enumerate().rev() {
-            if let Some(second) = self.second(&answer, share, &mut begun, options)? {
+            if let Some(second) = self.second(&answer, share, &mut begun, None, options)? {
                 found = Some((count, share, second));
                 break;
             }
@@ -140,7 +142,7 @@ impl Stage<'_> {
                 return Ok(moderated(0.0, answer));
             }
             for &share in &ladder[..smaller] {
-                let second = self.second(&answer, share, &mut begun, options)?;
+                let second = self.second(&answer, share, &mut begun, Some((&most, enough)), options)?;
                 if let Some(second) = second.filter(|second| self.effort(second, &most) <= enough) {
                     return Ok(moderated(share, second));
                 }
@@ -149,15 +151,17 @@ impl Stage<'_> {
         Ok(moderated(largest, most))
     }
 
-    /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it.
+    /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it,
+    /// or where its effort would be far from `enough`: (whose ellipsoids it is measured on, how much).
     fn second(
         &self,
         first: &Answer,
         share: f64,
         begun: &mut Problem,
+        enough: Option<(&Answer, f64)>,
         options: &Options,
     ) -> Result<Option<Answer>, Error> {
-        let points = self.least_effort(first.objective, share, begun, options)?;
+        let points = self.least_effort(first.objective, share, begun, enough, options)?;
         let has_point = |point: &&Answer| {
             point.outcome.is_optimal() || matches!(point.outcome, Outcome::Inaccurate(_)) && point.objective.is_finite()
         };
@@ -185,6 +189,7 @@ impl Stage<'_> {
         optimum: f64,
         share: f64,
         begun: &mut Problem,
+        enough: Option<(&Answer, f64)>,
         options: &Options,
     ) -> Result<Vec<Answer>, Error> {
         let one = |value: f64| Expr::constant(Mat::from_fn(1, 1, |_, _| value));
@@ -202,7 +207,16 @@ impl Stage<'_> {
         }
         problem.minimize(&tau);
         let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
-        let least_effort = problem.solve(&options)?;
+        // what is hopeless is left after the first rounds
+        let mut start = problem.clone();
+        if problem.has_lazy() {
+            let Some(sketch) = problem.sketch(&options)? else { return Ok(Vec::new()) };
+            if enough.is_some_and(|(measure, enough)| self.effort(&sketch, measure) > FAR_MORE * enough) {
+                return Ok(Vec::new());
+            }
+            start = problem.beginning_with(&sketch);
+        }
+        let least_effort = start.solve(&options)?;
         *begun = begun.beginning_with(&least_effort);
         let effort = least_effort.value(&tau)[(0, 0)];
         let large = |q: &&Mat<f64>| effort * self.condition(&least_effort, q) > LARGE_GAIN.powi(2);
@@ -214,8 +228,12 @@ impl Stage<'_> {
             problem.positive_definite_by(format!("condition at vertex {}", i + 1), block, 0.0);
         }
         problem.minimize(&nu);
-        let conditioned = problem.beginning_with(&least_effort).solve(&options)?;
-        Ok(vec![conditioned, least_effort])
+        let mut conditioned = problem.beginning_with(&least_effort);
+        if problem.has_lazy() {
+            let Some(sketch) = conditioned.sketch(&options)? else { return Ok(vec![least_effort]) };
+            conditioned = conditioned.beginning_with(&sketch);
+        }
+        Ok(vec![conditioned.solve(&options)?, least_effort])
     }
 
     /// The least ν with P ⪯ νQ at every vertex, Q ≻ 0.
