@@ -73,24 +73,37 @@ impl Problem {
     /// Those of [`Self::solve`].
     pub fn sketch(&self, options: &Options) -> Result<Option<Answer>, Error> {
         options.check()?;
-        let answer = self.rounds(options, Until::NothingMoves)?;
+        let answer = self.rounds(options, Until::NothingMoves, &GAPS)?;
         let is_point = answer.outcome.is_optimal() || matches!(answer.outcome, Outcome::Inaccurate(_));
         Ok(Some(answer).filter(|answer| is_point && !is_nowhere(answer)))
+    }
+
+    /// Solves the problem as [`Self::solve`] does, going on from its [sketch](Self::sketch).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::solve`].
+    pub fn solve_sketched(&self, sketch: &Answer, options: &Options) -> Result<Answer, Error> {
+        let problem = self.beginning_with(sketch);
+        match problem.has_lazy() {
+            true => problem.rounds(options, Until::Solved, &GAPS[1..]),
+            false => problem.solve(options),
+        }
     }
 
     /// The answer to the whole problem, in which nothing but the inequalities that are not lazy need be posed.
     pub(crate) fn generate(&self, options: &Options) -> Result<Answer, Error> {
         options.check()?;
-        self.rounds(options, Until::Solved)
+        self.rounds(options, Until::Solved, &GAPS)
     }
 
-    fn rounds(&self, options: &Options, until: Until) -> Result<Answer, Error> {
+    /// Rounds at the gaps given, and then at that of the options.
+    fn rounds(&self, options: &Options, until: Until, gaps: &[f64]) -> Result<Answer, Error> {
         let mut posed: Vec<bool> = self.inequalities.iter().map(|inequality| inequality.lazy.is_none()).collect();
         let mut iterations = Vec::new();
         // what is broken far from the optimum is known from a point that is not yet there
-        let mut gaps = GAPS.into_iter().filter(|gap| *gap > options.gap_tolerance);
+        let mut gaps = gaps.iter().copied().filter(|gap| *gap > options.gap_tolerance);
         let mut gap = gaps.next().unwrap_or(options.gap_tolerance);
-        let far = gap;
         let mut last = f64::INFINITY;
         for round in 0.. {
             if round == MOST_ROUNDS || !posed.contains(&true) {
@@ -121,7 +134,7 @@ impl Problem {
             }
             // an objective that has become worse never comes back to what it was, so that nothing goes round in circles
             if has_moved && !broken.is_empty() {
-                let carries = carrying(&answer.multipliers, if gap == far { IDLE } else { IDLE_AT_OPTIMUM });
+                let carries = carrying(&answer.multipliers, if gap == GAPS[0] { IDLE } else { IDLE_AT_OPTIMUM });
                 let mut carries = carries.into_iter();
                 for (posed, inequality) in posed.iter_mut().zip(&self.inequalities).filter(|(posed, _)| **posed) {
                     *posed = carries.next().unwrap_or(true) || inequality.lazy.is_none();

@@ -207,16 +207,14 @@ impl Stage<'_> {
         }
         problem.minimize(&tau);
         let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
-        // what is hopeless is left after the first rounds
-        let mut start = problem.clone();
-        if problem.has_lazy() {
-            let Some(sketch) = problem.sketch(&options)? else { return Ok(Vec::new()) };
-            if enough.is_some_and(|(measure, enough)| self.effort(&sketch, measure) > FAR_MORE * enough) {
-                return Ok(Vec::new());
-            }
-            start = problem.beginning_with(&sketch);
-        }
-        let least_effort = start.solve(&options)?;
+        // of what is measured at all: a sketch may miss definiteness by rounding
+        let is_hopeless = |sketch: &Answer| {
+            enough.is_some_and(|(measure, enough)| {
+                let effort = self.effort(sketch, measure);
+                effort.is_finite() && effort > FAR_MORE * enough
+            })
+        };
+        let Some(least_effort) = solve_unless(is_hopeless, &problem, &options)? else { return Ok(Vec::new()) };
         *begun = begun.beginning_with(&least_effort);
         let effort = least_effort.value(&tau)[(0, 0)];
         let large = |q: &&Mat<f64>| effort * self.condition(&least_effort, q) > LARGE_GAIN.powi(2);
@@ -228,12 +226,8 @@ impl Stage<'_> {
             problem.positive_definite_by(format!("condition at vertex {}", i + 1), block, 0.0);
         }
         problem.minimize(&nu);
-        let mut conditioned = problem.beginning_with(&least_effort);
-        if problem.has_lazy() {
-            let Some(sketch) = conditioned.sketch(&options)? else { return Ok(vec![least_effort]) };
-            conditioned = conditioned.beginning_with(&sketch);
-        }
-        Ok(vec![conditioned.solve(&options)?, least_effort])
+        let conditioned = solve_unless(|_| false, &problem.beginning_with(&least_effort), &options)?;
+        Ok(conditioned.into_iter().chain([least_effort]).collect())
     }
 
     /// The least ν with P ⪯ νQ at every vertex, Q ≻ 0.
@@ -265,5 +259,21 @@ impl Stage<'_> {
             symmetric_eigenvalues(&effort).into_iter().fold(0.0, f64::max).sqrt()
         };
         gains.iter().zip(self.y).map(at).fold(0.0, f64::max)
+    }
+}
+
+/// The answer, if it is not hopeless after the first rounds: by `is_hopeless`, or because these come to no point. Of a problem that is posed all
+/// at once there are no such rounds.
+fn solve_unless(
+    is_hopeless: impl Fn(&Answer) -> bool,
+    problem: &Problem,
+    options: &Options,
+) -> Result<Option<Answer>, Error> {
+    if !problem.has_lazy() {
+        return problem.solve(options).map(Some);
+    }
+    match problem.sketch(options)?.filter(|sketch| !is_hopeless(sketch)) {
+        Some(sketch) => problem.solve_sketched(&sketch, options).map(Some),
+        None => Ok(None),
     }
 }
