@@ -11,7 +11,8 @@
 //! spread over the unknowns, of which a symmetric one has two places.
 
 use crate::aligned::{Aligned, PADDING};
-use crate::block::Block;
+use crate::block::{Block, DenseBlock};
+use crate::combination::Combinations;
 use crate::dense::axpy;
 use crate::factored::{Factored, Group, NO_UNKNOWN};
 use crate::vectorized::arch;
@@ -86,19 +87,44 @@ pub(crate) struct Assembly {
     pairs: Vec<Pair>,
     memory: Aligned,
     product: Vec<f64>,
+    /// Of each block whose unknowns enter in combinations.
+    combined: Vec<Option<Box<Combined>>>,
+    /// The matrix of the combinations of one block.
+    of_combinations: Vec<f64>,
+}
+
+/// A block by itself, with the combinations in place of the unknowns.
+#[derive(Debug)]
+struct Combined {
+    assembly: Assembly,
+    combinations: Combinations,
 }
 
 impl Assembly {
     pub fn new(blocks: &[Block]) -> Self {
+        let none = Factored::default();
+        let factored = |block| match block {
+            &Block::Dense(DenseBlock { ref factored, .. }) => factored,
+            Block::Diagonal(_) => &none,
+        };
+        let all: Vec<&Factored> = blocks.iter().map(factored).collect();
+        let combined = |factored: &&Factored| {
+            let combinations = factored.combinations()?.clone();
+            Some(Box::new(Combined { assembly: Self::of(&[factored]), combinations }))
+        };
+        let combined: Vec<Option<Box<Combined>>> = all.iter().map(combined).collect();
+        let alone = |factored: &Factored| factored.combinations().is_none();
+        let of_unknowns: Vec<&Factored> = all.iter().map(|f| if alone(f) { f } else { &none }).collect();
+        let longest = combined.iter().flatten().map(|combined| combined.combinations.len).max().unwrap_or(0);
+        Self { combined, of_combinations: vec![0.0; longest * longest], ..Self::of(&of_unknowns) }
+    }
+
+    /// Of stacks as they are, whatever their positions stand for.
+    fn of(blocks: &[&Factored]) -> Self {
         let mut assembly = Self::default();
         let mut rows: Vec<Vec<Row>> = Vec::new();
         let mut known: HashMap<&[usize], usize> = HashMap::new();
-        let none = Factored::default();
-        for block in blocks {
-            let factored = match block {
-                Block::Dense(block) => &block.factored,
-                Block::Diagonal(_) => &none,
-            };
+        for factored in blocks {
             let mut of_block = Vec::new();
             for (index, group) in factored.groups().iter().enumerate() {
                 let &Group { u, v, cols, symmetric, .. } = group;
@@ -160,6 +186,9 @@ impl Assembly {
 
     /// Takes over P and Z of one block.
     pub fn project(&mut self, block: usize, factored: &Factored, p: &[f64], z: &[f64]) {
+        if let Some(combined) = self.combined.get_mut(block).and_then(Option::as_mut) {
+            return combined.assembly.project(0, factored, p, z);
+        }
         let part = &mut self.parts[block];
         factored.project(p, &mut self.product, &mut part.wpw);
         factored.project(z, &mut self.product, &mut part.wzw);
@@ -170,6 +199,13 @@ impl Assembly {
     /// is near in memory was touched before.
     pub fn add(&mut self, m: &mut [f64], unknowns: usize) {
         arch().dispatch(Sums { assembly: self, m, unknowns });
+        for Combined { assembly, combinations } in self.combined.iter_mut().flatten().map(|combined| &mut **combined) {
+            let n = combinations.len;
+            let h = &mut self.of_combinations[..n * n];
+            h.fill(0.0);
+            assembly.add(h, n);
+            combinations.spread(h, m, unknowns);
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 //! each matrix unknown enters each block.
 
 use crate::Mat;
+use crate::dense::axpy;
 use std::sync::Arc;
 
 /// A matrix unknown of one problem.
@@ -289,7 +290,7 @@ impl Expr {
     pub(crate) fn evaluate<'a>(&self, value_of: &dyn Fn(Unknown) -> &'a Mat<f64>) -> Mat<f64> {
         let mut sum = (*self.constant).clone();
         for term in self.terms.iter() {
-            sum += term.evaluate(value_of(term.unknown));
+            term.add_to(value_of(term.unknown), &mut sum);
         }
         sum
     }
@@ -302,6 +303,30 @@ impl Term {
             Shape::Product { left, transposed: false, right } => left * x * right,
             Shape::Product { left, transposed: true, right } => left * x.transpose() * right,
             Shape::Scaled { weights, matrix } => inner_product(weights, x) * matrix,
+        }
+    }
+
+    /// sum ← sum + the value of the term at X = `x`. Most of U and V is zero where the term stands in a corner of a block.
+    fn add_to(&self, x: &Mat<f64>, sum: &mut Mat<f64>) {
+        let Shape::Product { left, transposed, right } = &self.shape else {
+            *sum += self.evaluate(x);
+            return;
+        };
+        let inner = left.ncols();
+        let mut xv = vec![0.0; inner];
+        for column in 0..right.ncols() {
+            xv.fill(0.0);
+            for (k, v) in right.col_as_slice(column).iter().enumerate().filter(|(_, v)| **v != 0.0) {
+                match transposed {
+                    true => xv.iter_mut().enumerate().for_each(|(i, xv)| *xv += v * x[(k, i)]),
+                    false => axpy(*v, x.col_as_slice(k), &mut xv),
+                }
+            }
+            let out = sum.col_as_slice_mut(column);
+            xv.iter()
+                .enumerate()
+                .filter(|(_, xv)| **xv != 0.0)
+                .for_each(|(i, xv)| axpy(*xv, left.col_as_slice(i), out));
         }
     }
 

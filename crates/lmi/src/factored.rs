@@ -15,6 +15,7 @@
 //! alone, `(v_pᵀPv_r)(v_qᵀZv_s)`, does for all.
 
 use crate::aligned::PADDING;
+use crate::combination::Combinations;
 use crate::dense::axpy;
 use crate::sparse::Entry;
 use crate::vectorized::vectorized;
@@ -144,12 +145,16 @@ pub(crate) struct Factored {
     n: usize,
     w: Columns,
     groups: Vec<Group>,
+    /// What the groups hold in place of the unknowns, where these enter in combinations.
+    combinations: Option<Combinations>,
 }
 
 /// Scratch memory of one block's factored part, reused in every iteration.
 #[derive(Debug, Default)]
 pub(crate) struct FactoredScratch {
     product: Vec<f64>,
+    /// Of the combinations.
+    combined: Vec<f64>,
 }
 
 impl Factored {
@@ -173,7 +178,12 @@ impl Factored {
                 groups.push(Group::new(&w, u, v, rest, false));
             }
         }
-        Self { n, w, groups }
+        Self { n, w, groups, combinations: None }
+    }
+
+    /// Of stacks whose positions are those of scalars of combinations.
+    pub fn of_combinations(n: usize, stacks: Vec<Stack>, combinations: Option<Combinations>) -> Self {
+        Self { combinations, ..Self::new(n, stacks) }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -193,7 +203,8 @@ impl Factored {
 
     pub fn scratch(&self) -> FactoredScratch {
         let widest = self.groups.iter().map(|g| g.cols).max().unwrap_or(0);
-        FactoredScratch { product: vec![0.0; self.n * widest.max(1)] }
+        let combined = vec![0.0; self.combinations.as_ref().map_or(0, |combinations| combinations.len)];
+        FactoredScratch { product: vec![0.0; self.n * widest.max(1)], combined }
     }
 
     /// Rows of the block.
@@ -210,6 +221,11 @@ impl Factored {
         &self.groups
     }
 
+    /// What the groups hold in place of the unknowns, where these enter in combinations.
+    pub fn combinations(&self) -> Option<&Combinations> {
+        self.combinations.as_ref()
+    }
+
     /// WᵀHW for symmetric H, row by row; what belongs to empty columns is left as it is.
     pub fn project(&self, h: &[f64], product: &mut [f64], out: &mut [f64]) {
         project(self.n, &self.w, h, &mut product[..self.n * self.w.len()], out);
@@ -217,9 +233,17 @@ impl Factored {
 
     /// out ← out + F(x) − F(0).
     pub fn apply(&self, x: &[f64], out: &mut [f64], scratch: &mut FactoredScratch) {
+        let FactoredScratch { product, combined } = scratch;
+        let x = match &self.combinations {
+            Some(combinations) => {
+                combinations.gather(x, combined);
+                combined
+            }
+            None => x,
+        };
         for group in &self.groups {
             if group.entries.is_empty() {
-                apply(self.n, &self.w, group, x, &mut scratch.product, out);
+                apply(self.n, &self.w, group, x, product, out);
             }
             group.entries.iter().for_each(|entry| entry.apply(self.n, x, out));
         }
@@ -227,9 +251,21 @@ impl Factored {
 
     /// out_i ← out_i + factor·⟨F_i, H⟩ for symmetric H.
     pub fn adjoint(&self, factor: f64, h: &[f64], out: &mut [f64], scratch: &mut FactoredScratch) {
+        let FactoredScratch { product, combined } = scratch;
+        match &self.combinations {
+            Some(combinations) => {
+                combined.fill(0.0);
+                self.adjoint_of_groups(factor, h, combined, product);
+                combinations.scatter(combined, out);
+            }
+            None => self.adjoint_of_groups(factor, h, out, product),
+        }
+    }
+
+    fn adjoint_of_groups(&self, factor: f64, h: &[f64], out: &mut [f64], product: &mut [f64]) {
         for group in &self.groups {
             if group.entries.is_empty() {
-                adjoint(self.n, &self.w, group, factor, h, &mut scratch.product, out);
+                adjoint(self.n, &self.w, group, factor, h, product, out);
             }
             group.entries.iter().for_each(|entry| out[entry.unknown] += factor * entry.inner_product(self.n, h));
         }
@@ -241,7 +277,8 @@ impl Factored {
             for (at, &position) in group.positions.iter().enumerate().filter(|(_, at)| **at != NO_UNKNOWN) {
                 for &(i, u) in self.w.column(group.u + at / group.cols) {
                     for &(j, v) in self.w.column(group.v + at % group.cols) {
-                        visit(i.max(j), i.min(j), Some(position), group.weight() * u * v);
+                        let value = group.weight() * u * v;
+                        self.each_unknown(position, |at, factor| visit(i.max(j), i.min(j), Some(at), factor * value));
                     }
                 }
             }
@@ -263,10 +300,19 @@ impl Factored {
             for r in 0..group.rows {
                 for s in (0..group.cols).filter(|s| group.positions[r * group.cols + s] != NO_UNKNOWN) {
                     let norm = 2.0_f64.sqrt() * group.weight() * lengths[group.u + r] * lengths[group.v + s];
-                    let out = &mut out[group.positions[r * group.cols + s]];
-                    *out = out.max(norm);
+                    self.each_unknown(group.positions[r * group.cols + s], |at, factor| {
+                        out[at] = out[at].max(factor.abs() * norm);
+                    });
                 }
             }
+        }
+    }
+
+    /// The unknowns behind a position of a group, with their factors.
+    fn each_unknown(&self, position: usize, mut visit: impl FnMut(usize, f64)) {
+        match &self.combinations {
+            Some(combinations) => combinations.unknowns(position).for_each(|(at, factor)| visit(at, factor)),
+            None => visit(position, 1.0),
         }
     }
 }

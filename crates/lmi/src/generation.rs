@@ -5,28 +5,40 @@
 //! exchange method, R. Hettich and K. Kortanek 1993). What is found is the optimum of the whole problem: a bound on the optimum of a relaxed problem, and a
 //! contradiction in one, are those of the whole.
 
-use crate::answer::{Answer, InaccurateReason, Outcome, Tolerance, Witness};
+use crate::answer::{Answer, InaccurateReason, Outcome, Residuals, Tolerance, Witness};
 use crate::problem::{Inequality, Problem};
 use crate::{Error, Expr, Mat, Options};
 use faer::Side;
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 /// Rounds after which everything is posed.
 const MOST_ROUNDS: usize = 40;
-/// Relative gap of the first rounds, and what it is multiplied by where nothing is broken.
-const FIRST_GAP: f64 = 1e-2;
-const NEXT_GAP: f64 = 1e-4;
+/// Relative gaps of the rounds until nothing is broken: far from the optimum, and near it.
+const GAPS: [f64; 2] = [1e-2, 1e-6];
 /// Of the largest trace of a multiplier: what carries less is taken back while the objective still moves.
 const IDLE: f64 = 2e-3;
 /// The same where the gap is small.
 const IDLE_AT_OPTIMUM: f64 = 1e-5;
 /// Of the worst violation: what is broken by less waits for the next round.
 const WORTH_POSING: f64 = 0.05;
+/// Residual and relative gap beyond which there is no point to speak of.
+const NOWHERE: (f64, f64) = (1e-5, 0.1);
+/// How many of one family are posed at a time. A round costs more than a few inequalities that turn out not to matter.
+const OF_FAMILY: usize = 3;
+
+/// What the rounds are for.
+#[derive(Clone, Copy, PartialEq)]
+enum Until {
+    /// The answer.
+    Solved,
+    /// A point that the next round would not move by more than its gap.
+    NothingMoves,
+}
 
 impl Problem {
     /// Demands `F ≻ 0`, or `F ⪰ margin·I` as [`Self::positive_definite_by`] does, and poses it to the solver only where an answer without it breaks it.
     /// For problems with hundreds of inequalities most of which do not matter; the answer is that of the whole problem. Of those of one `family`, which are
-    /// much alike, the worst is posed at a time.
+    /// much alike, the worst few are posed at a time.
     pub fn positive_definite_lazily(
         &mut self,
         name: impl Into<String>,
@@ -48,16 +60,50 @@ impl Problem {
         problem
     }
 
-    pub(crate) fn has_lazy(&self) -> bool {
+    /// Whether any inequality is posed only where it is broken.
+    pub fn has_lazy(&self) -> bool {
         self.inequalities.iter().any(|inequality| inequality.lazy.is_some())
+    }
+
+    /// A point near the optimum, to a percent or so of the objective, of which nothing is proved: enough to see whether the problem is worth
+    /// solving, in the first rounds of what [`Self::solve`] would do where inequalities are lazy. `None` where they come to no point.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::solve`].
+    pub fn sketch(&self, options: &Options) -> Result<Option<Answer>, Error> {
+        options.check()?;
+        let answer = self.rounds(options, Until::NothingMoves, &GAPS)?;
+        let is_point = answer.outcome.is_optimal() || matches!(answer.outcome, Outcome::Inaccurate(_));
+        Ok(Some(answer).filter(|answer| is_point && !is_nowhere(answer)))
+    }
+
+    /// Solves the problem as [`Self::solve`] does, going on from its [sketch](Self::sketch).
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::solve`].
+    pub fn solve_sketched(&self, sketch: &Answer, options: &Options) -> Result<Answer, Error> {
+        let problem = self.beginning_with(sketch);
+        match problem.has_lazy() {
+            true => problem.rounds(options, Until::Solved, &GAPS[1..]),
+            false => problem.solve(options),
+        }
     }
 
     /// The answer to the whole problem, in which nothing but the inequalities that are not lazy need be posed.
     pub(crate) fn generate(&self, options: &Options) -> Result<Answer, Error> {
+        options.check()?;
+        self.rounds(options, Until::Solved, &GAPS)
+    }
+
+    /// Rounds at the gaps given, and then at that of the options.
+    fn rounds(&self, options: &Options, until: Until, gaps: &[f64]) -> Result<Answer, Error> {
         let mut posed: Vec<bool> = self.inequalities.iter().map(|inequality| inequality.lazy.is_none()).collect();
         let mut iterations = Vec::new();
         // what is broken far from the optimum is known from a point that is not yet there
-        let mut gap = options.gap_tolerance.max(FIRST_GAP);
+        let mut gaps = gaps.iter().copied().filter(|gap| *gap > options.gap_tolerance);
+        let mut gap = gaps.next().unwrap_or(options.gap_tolerance);
         let mut last = f64::INFINITY;
         for round in 0.. {
             if round == MOST_ROUNDS || !posed.contains(&true) {
@@ -76,15 +122,19 @@ impl Problem {
             let is_unbounded = matches!(answer.outcome, Outcome::Unbounded(_) | Outcome::UnboundedToTolerance(_));
             if is_unbounded && posed.contains(&false) {
                 posed.fill(true);
+            } else if until == Until::NothingMoves && (broken.is_empty() || !has_moved || is_nowhere(&answer)) {
+                answer.multipliers = self.spread(std::mem::take(&mut answer.multipliers), &posed);
+                (answer.iterations, answer.centre) = (iterations, None);
+                return Ok(answer);
             } else if has_point && gap > options.gap_tolerance && (broken.is_empty() || !has_moved) {
-                gap = options.gap_tolerance.max(NEXT_GAP * gap);
+                gap = gaps.next().unwrap_or(options.gap_tolerance);
             } else if broken.is_empty() {
                 answer.iterations = iterations;
                 return self.completed(answer, &posed);
             }
             // an objective that has become worse never comes back to what it was, so that nothing goes round in circles
             if has_moved && !broken.is_empty() {
-                let carries = carrying(&answer.multipliers, if gap == FIRST_GAP { IDLE } else { IDLE_AT_OPTIMUM });
+                let carries = carrying(&answer.multipliers, if gap == GAPS[0] { IDLE } else { IDLE_AT_OPTIMUM });
                 let mut carries = carries.into_iter();
                 for (posed, inequality) in posed.iter_mut().zip(&self.inequalities).filter(|(posed, _)| **posed) {
                     *posed = carries.next().unwrap_or(true) || inequality.lazy.is_none();
@@ -123,27 +173,33 @@ impl Problem {
         broken.sort_by(|a, b| b.1.total_cmp(&a.1));
         let worst = broken.first().map_or(0.0, |first| first.1);
         let is_worth = |&(_, violation): &(usize, f64)| violation > 0.0 && violation >= WORTH_POSING * worst;
-        let mut families = BTreeSet::new();
-        let leads = |&(block, _): &(usize, f64)| families.insert(self.inequalities[block].lazy);
+        let mut families: BTreeMap<Option<usize>, usize> = BTreeMap::new();
+        let leads = |&(block, _): &(usize, f64)| {
+            let before = families.entry(self.inequalities[block].lazy).or_default();
+            *before += 1;
+            *before <= OF_FAMILY
+        };
         broken.into_iter().take_while(is_worth).filter(leads).map(|(block, _)| block).collect()
     }
 
-    /// The answer as one of the whole problem: blocks that were not posed are proved, and have a multiplier of zero.
-    fn completed(&self, mut answer: Answer, posed: &[bool]) -> Result<Answer, Error> {
+    /// Multipliers of what is posed as those of all inequalities.
+    fn spread(&self, of_posed: Vec<Mat<f64>>, posed: &[bool]) -> Vec<Mat<f64>> {
         let nothing = |inequality: &Inequality| {
             let n = inequality.expression.nrows();
             Mat::zeros(n, n)
         };
-        let spread = |of: Vec<Mat<f64>>| -> Vec<Mat<f64>> {
-            let mut of = of.into_iter();
-            let each = self.inequalities.iter().zip(posed);
-            each.map(|(inequality, posed)| posed.then(|| of.next()).flatten().unwrap_or_else(|| nothing(inequality)))
-                .collect()
-        };
-        answer.multipliers = spread(std::mem::take(&mut answer.multipliers));
+        let mut of_posed = of_posed.into_iter();
+        let each = self.inequalities.iter().zip(posed);
+        each.map(|(inequality, posed)| posed.then(|| of_posed.next()).flatten().unwrap_or_else(|| nothing(inequality)))
+            .collect()
+    }
+
+    /// The answer as one of the whole problem: blocks that were not posed are proved, and have a multiplier of zero.
+    fn completed(&self, mut answer: Answer, posed: &[bool]) -> Result<Answer, Error> {
+        answer.multipliers = self.spread(std::mem::take(&mut answer.multipliers), posed);
         answer.centre = None;
         if let Outcome::Infeasible(witness) | Outcome::InfeasibleWithin(witness) = &mut answer.outcome {
-            let multipliers = spread(std::mem::take(&mut witness.multipliers));
+            let multipliers = self.spread(std::mem::take(&mut witness.multipliers), posed);
             let smallest_eigenvalue = witness.smallest_eigenvalue.min(0.0);
             *witness = Witness { multipliers, smallest_eigenvalue, ..witness.clone() };
         }
@@ -175,6 +231,12 @@ impl Problem {
         }
         Ok(answer)
     }
+}
+
+/// Whether the iteration ended far from any point that satisfies what is posed.
+fn is_nowhere(answer: &Answer) -> bool {
+    let Residuals { primal, gap, .. } = answer.residuals;
+    matches!(answer.outcome, Outcome::Inaccurate(_)) && (primal.is_nan() || primal > NOWHERE.0 && gap > NOWHERE.1)
 }
 
 /// Whether the objective moved by more than the gap lets see.

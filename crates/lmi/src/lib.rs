@@ -58,6 +58,7 @@ mod balancing;
 mod block;
 mod cholesky;
 mod coefficients;
+mod combination;
 mod conditioning;
 mod dense;
 mod direction;

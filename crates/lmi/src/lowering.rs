@@ -5,6 +5,7 @@
 //! LMIs of control that leaves one stack per block.
 
 use crate::block::{Block, DenseBlock, DiagonalBlock, Program};
+use crate::combination::{Combinations, Part};
 use crate::dense::{axpy, dot};
 use crate::expression::{Expr, Shape, Term, Unknown};
 use crate::factored::{Factored, Stack};
@@ -46,6 +47,12 @@ impl Layout {
         } else {
             start + i * unknown.cols + j
         }
+    }
+
+    /// The first scalar of an unknown, and how many it has.
+    fn scalars_of(&self, unknown: Unknown) -> (usize, usize) {
+        let start = self.starts[unknown.index];
+        (start, self.starts.get(unknown.index + 1).unwrap_or(&self.len) - start)
     }
 
     /// The unknowns as matrices.
@@ -294,7 +301,13 @@ fn lower_block(expression: &Expr, layout: &Layout) -> Block {
             Shape::Product { .. } => products.push(Product::of(term)),
         }
     }
-    let stacks = stack(products, layout);
+    let gathered = gather(products);
+    let combined = if n > 1 { combine(&gathered, layout) } else { None };
+    if let Some((stacks, combinations)) = combined {
+        let factored = Factored::of_combinations(n, stacks, Some(combinations));
+        return Block::Dense(DenseBlock { size: n, constant, factored, sparse: Sparse::new(n, entries) });
+    }
+    let stacks = stack(gathered, layout);
     if n == 1 {
         let mut row: Vec<(usize, f64)> = entries.iter().map(|e: &Entry| (e.unknown, e.value)).collect();
         for stack in &stacks {
@@ -382,42 +395,179 @@ fn with_right_factor(forms: &mut Forms, v: &Mat<f64>) -> Option<Product> {
     fits.and_then(Option::take)
 }
 
-/// Gathers products into stacks, most frequent right factor first.
-fn stack(products: Vec<Product>, layout: &Layout) -> Vec<Stack> {
+/// Products with one right factor.
+struct Gathered {
+    v: Mat<f64>,
+    products: Vec<Product>,
+}
+
+/// Gathers products by their right factors, most frequent first.
+fn gather(products: Vec<Product>) -> Vec<Gathered> {
     let forms = |product: Product| {
         let flipped = product.flipped();
         [Some(product), flipped]
     };
     let mut left: Vec<Forms> = merge_left_factors(products).into_iter().map(forms).collect();
-    let mut stacks = Vec::new();
+    let mut gathered = Vec::new();
     while !left.is_empty() {
         let v = most_frequent_right_factor(&left);
-        let mut merged: Vec<Product> = Vec::new();
-        let mut rest = Vec::new();
+        let (mut products, mut rest) = (Vec::new(), Vec::new());
         for mut forms in left {
             match with_right_factor(&mut forms, &v) {
                 None => rest.push(forms),
-                Some(product) => match merged.iter_mut().find(|m| m.unknown == product.unknown) {
-                    Some(m) => m.u += &product.u,
-                    None => merged.push(product),
-                },
+                Some(product) => products.push(product),
             }
         }
         left = rest;
-        let columns = nonzero_columns(&v);
-        let mut stack =
-            Stack { u: Vec::new(), v: columns.iter().map(|&j| column(&v, j, 1.0)).collect(), positions: vec![] };
-        for product in &merged {
-            for i in nonzero_columns(&product.u) {
-                stack.u.push(column(&product.u, i, 0.5));
-                stack.positions.extend(columns.iter().map(|&j| layout.position(product.unknown, i, j)));
-            }
-        }
-        if !stack.u.is_empty() && !stack.v.is_empty() {
-            stacks.push(stack);
+        gathered.push(Gathered { v, products });
+    }
+    gathered
+}
+
+/// One product for each unknown.
+fn merge(products: impl Iterator<Item = Product>) -> Vec<Product> {
+    let mut merged: Vec<Product> = Vec::new();
+    for product in products {
+        match merged.iter_mut().find(|m| m.unknown == product.unknown) {
+            Some(m) => m.u += &product.u,
+            None => merged.push(product),
         }
     }
-    stacks
+    merged
+}
+
+/// A stack for each right factor.
+fn stack(gathered: Vec<Gathered>, layout: &Layout) -> Vec<Stack> {
+    let stacks = gathered.into_iter().map(|Gathered { v, products }| {
+        let merged = merge(products.into_iter());
+        let rows = merged.iter().map(|product| (&product.u, product.unknown));
+        stack_of(&v, rows, |unknown, i, j| layout.position(unknown, i, j))
+    });
+    stacks.filter(|stack| !stack.u.is_empty() && !stack.v.is_empty()).collect()
+}
+
+/// The stack of left factors, with what they stand before and where the scalars of that are.
+fn stack_of<'a, T: Copy>(
+    v: &Mat<f64>,
+    rows: impl Iterator<Item = (&'a Mat<f64>, T)>,
+    position: impl Fn(T, usize, usize) -> usize,
+) -> Stack {
+    let columns = nonzero_columns(v);
+    let mut stack = Stack { u: Vec::new(), v: columns.iter().map(|&j| column(v, j, 1.0)).collect(), positions: vec![] };
+    for (u, of) in rows {
+        for i in nonzero_columns(u) {
+            stack.u.push(column(u, i, 0.5));
+            stack.positions.extend(columns.iter().map(|&j| position(of, i, j)));
+        }
+    }
+    stack
+}
+
+/// `U (Σ cₖXₖ) Vᵀ`.
+struct Member {
+    u: Mat<f64>,
+    of: Vec<(Unknown, f64)>,
+}
+
+impl Member {
+    fn new(product: Product) -> Self {
+        let Product { unknown, u, .. } = product;
+        let first = first_entry(&u).unwrap_or(1.0);
+        // where nothing is lost by it, the factor is taken out of U, which then may be V
+        let unit = Mat::from_fn(u.nrows(), u.ncols(), |i, j| u[(i, j)] / first);
+        match is_multiple(&u, first, &unit) {
+            true => Self { u: unit, of: vec![(unknown, first)] },
+            false => Self { u, of: vec![(unknown, 1.0)] },
+        }
+    }
+
+    /// The factor of an unknown that this holds, if it may hold it too.
+    fn factor(&self, product: &Product) -> Option<f64> {
+        let shape = |unknown: Unknown| (unknown.rows, unknown.cols, unknown.symmetric);
+        let is_other = |(unknown, _): &(Unknown, f64)| *unknown != product.unknown;
+        if shape(self.of[0].0) != shape(product.unknown) || !self.of.iter().all(is_other) {
+            return None;
+        }
+        let factor = first_entry(&product.u)? / first_entry(&self.u)?;
+        is_multiple(&product.u, factor, &self.u).then_some(factor)
+    }
+
+    fn products(self, v: &Mat<f64>) -> impl Iterator<Item = Product> {
+        let Self { u, of } = self;
+        of.into_iter().map(move |(unknown, factor)| Product { unknown, u: factor * &u, v: v.clone() })
+    }
+}
+
+/// Products as members, such that differ by a factor alone in one; those that vanish in none.
+fn members(products: impl IntoIterator<Item = Product>) -> Vec<Member> {
+    let mut members: Vec<Member> = Vec::new();
+    for product in products.into_iter().filter(|product| first_entry(&product.u).is_some()) {
+        let takes = members.iter_mut().find_map(|member| member.factor(&product).map(|factor| (member, factor)));
+        match takes {
+            Some((member, factor)) => member.of.push((product.unknown, factor)),
+            None => members.push(Member::new(product)),
+        }
+    }
+    members
+}
+
+/// Unknowns of a sum that it is worth to look at as one, beside what they are in by themselves.
+const MANY: usize = 3;
+
+/// The stacks in combinations of unknowns, where these have three quarters of the scalars at most.
+fn combine(gathered: &[Gathered], layout: &Layout) -> Option<(Vec<Stack>, Combinations)> {
+    let sum_of = |Gathered { v, products }: &Gathered| {
+        let (mut many, few): (Vec<Member>, Vec<Member>) =
+            members(products.iter().cloned()).into_iter().partition(|member| member.of.len() >= MANY);
+        many.extend(members(merge(few.into_iter().flat_map(|member| member.products(v)))));
+        many
+    };
+    let sums: Vec<Vec<Member>> = gathered.iter().map(sum_of).collect();
+    let mut combinations = Combinations { parts: Vec::new(), len: 0 };
+    let mut starts: Vec<Vec<usize>> = Vec::new();
+    let mut unknowns: Vec<Unknown> = Vec::new();
+    for members in &sums {
+        let mut of_members = Vec::new();
+        for Member { of, .. } in members {
+            let of_scalars: Vec<(usize, f64)> =
+                of.iter().map(|&(x, factor)| (layout.scalars_of(x).0, factor)).collect();
+            let len = layout.scalars_of(of[0].0).1;
+            of.iter().for_each(|(x, _)| {
+                if !unknowns.contains(x) {
+                    unknowns.push(*x)
+                }
+            });
+            let known = combinations.parts.iter().find(|part| part.of == of_scalars).map(|part| part.start);
+            of_members.push(known.unwrap_or_else(|| {
+                let start = combinations.len;
+                combinations.parts.push(Part { start, len, of: of_scalars });
+                combinations.len += len;
+                start
+            }));
+        }
+        starts.push(of_members);
+    }
+    let scalars: usize = unknowns.iter().map(|&unknown| layout.scalars_of(unknown).1).sum();
+    if 4 * combinations.len >= 3 * scalars {
+        return None;
+    }
+    let stacks = gathered.iter().zip(&sums).zip(&starts).map(|((Gathered { v, .. }, members), starts)| {
+        let rows = members.iter().zip(starts).map(|(member, &start)| (&member.u, (member.of[0].0, start)));
+        stack_of(v, rows, |(unknown, start), i, j| {
+            start + layout.position(unknown, i, j) - layout.scalars_of(unknown).0
+        })
+    });
+    let stacks = stacks.filter(|stack| !stack.u.is_empty() && !stack.v.is_empty()).collect();
+    Some((stacks, combinations))
+}
+
+fn first_entry(m: &Mat<f64>) -> Option<f64> {
+    (0..m.ncols()).flat_map(|j| m.col_as_slice(j)).copied().find(|value| *value != 0.0)
+}
+
+/// Whether a = factor · b, to the bit.
+fn is_multiple(a: &Mat<f64>, factor: f64, b: &Mat<f64>) -> bool {
+    (0..a.ncols()).all(|j| a.col_as_slice(j).iter().zip(b.col_as_slice(j)).all(|(a, b)| *a == factor * b))
 }
 
 /// `U X V₁ᵀ + U X V₂ᵀ = U X (V₁ + V₂)ᵀ` where that leaves fewer terms than merging equal right factors would.
@@ -501,7 +651,7 @@ mod tests {
     }
 
     fn stacks(expression: &Expr, layout: &Layout) -> Vec<Stack> {
-        stack(expression.terms.iter().map(Product::of).collect(), layout)
+        stack(gather(expression.terms.iter().map(Product::of).collect()), layout)
     }
 
     #[test]
@@ -525,6 +675,38 @@ mod tests {
         assert_eq!(stacks[0].u.len(), 4);
     }
 
+    /// [Ẏ − s − sᵀ, …; …] of two vertices with B in common, for Ẏ = Σ νₖYₖ of all: the sum over the unknowns is looked at as one, and so is L₁ + L₂.
+    #[test]
+    fn a_block_in_combinations_is_its_expression() {
+        with_every_instruction_set(|| {
+            let mut problem = Problem::new();
+            let y: Vec<Expr> = (0..7).map(|k| problem.symmetric(format!("Y{k}"), 3)).collect();
+            let l: Vec<Expr> = (0..7).map(|k| problem.rectangular(format!("L{k}"), 2, 3)).collect();
+            let t = problem.scalar("t");
+            let unknowns: Vec<Unknown> = y.iter().chain(&l).chain([&t]).map(|x| x.terms[0].unknown).collect();
+            let layout = Layout::new(&unknowns);
+            for [i, j] in [[0, 3], [5, 1]] {
+                let rates = [0.5, -0.5, 0.5, 0.0, 0.3, -0.5, -0.3];
+                let rate = rates.iter().zip(&y).fold(Expr::zeros(3, 3), |sum, (&rate, y)| sum + rate * y);
+                let of = |i: usize, j: usize| {
+                    patternless(3, 3 + i).subcols(i, 3).to_owned() * &y[j] - patternless(3, 2) * &l[j]
+                };
+                let flow = of(i, j) + of(j, i);
+                let f = Expr::symmetric_blocks(vec![
+                    vec![2.0 * rate - (&flow + flow.t())],
+                    vec![&y[i] + &y[j], Expr::identity(3)],
+                    vec![&l[i] + &l[j], Expr::zeros(2, 3), Expr::identity(2)],
+                ]);
+                let f = f + t.times(&Mat::identity(8, 8));
+                let Block::Dense(block) = lower_block(&f, &layout) else { panic!("a dense block") };
+                let combinations = block.factored.combinations().expect("many unknowns in one sum");
+                // Ẏ, Yᵢ, Yⱼ and Lᵢ + Lⱼ
+                assert_eq!(combinations.len, 3 * 6 + 6);
+                assert_operators(&f, &layout);
+            }
+        });
+    }
+
     /// The operators of a lowered block against the expression itself.
     #[test]
     fn a_lowered_block_is_its_expression() {
@@ -536,11 +718,16 @@ mod tests {
         let (y, l, t) = (problem.symmetric("Y", 3), problem.rectangular("L", 2, 3), problem.scalar("t"));
         let unknowns = [y.terms[0].unknown, l.terms[0].unknown, t.terms[0].unknown];
         let layout = Layout::new(&unknowns);
-        let n = layout.len();
         let f = riccati(&y, &l)
             + t.times(&Mat::identity(8, 8))
             + (y.trace() + 2.0 * &t).times(&Mat::from_fn(8, 8, |i, j| (i * j) as f64));
-        let block = lower_block(&f, &layout);
+        assert_operators(&f, &layout);
+    }
+
+    /// 8 × 8.
+    fn assert_operators(f: &Expr, layout: &Layout) {
+        let n = layout.len();
+        let block = lower_block(f, layout);
         let mut scratch = block.scratch(n);
         let columns = |m: &Mat<f64>| -> Vec<f64> { (0..64).map(|at| m[(at % 8, at / 8)]).collect() };
         let value = |x: &[f64]| {

@@ -216,3 +216,103 @@ impl<'a> DoubleSum<'a> {
         blocks
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::eigen::smallest_eigenvalue;
+    use crate::model::FrozenModel;
+    use crate::plant::OperatingPoint;
+    use crate::synthesis::polytopic::rate_box_vertices;
+    use lmi::{Answer, Options, Outcome};
+
+    /// Stable plants of two states and one input that differ at every vertex.
+    fn polytope(count: usize) -> Polytope {
+        let entry = |i: usize, at: usize| (1.3 * i as f64 + 2.1 * at as f64).sin();
+        let model = |i: usize| FrozenModel {
+            rho: 0.0,
+            a: Mat::from_fn(2, 2, |r, c| 0.5 * entry(i, 2 * r + c) - if r == c { 1.5 } else { 0.0 }),
+            b: Mat::from_fn(2, 1, |r, _| if r == 0 { 0.2 } else { 1.0 }),
+            operating_point: OperatingPoint { state: vec![0.0; 2], input: vec![0.0] },
+        };
+        Polytope::hull(&(0..count).map(model).collect::<Vec<FrozenModel>>())
+    }
+
+    struct Posed {
+        problem: Problem,
+        unknowns: Unknowns,
+    }
+
+    fn lyapunov(count: usize, rate: f64) -> Lyapunov {
+        Lyapunov::ParameterDependent { rate_vertices: rate_box_vertices(count, rate) }
+    }
+
+    /// The inequalities of Theorem 4.4 with Q = I and R = I.
+    fn blocks(polytope: &Polytope, rate: f64, unknowns: &Unknowns) -> Vec<(String, Expr)> {
+        let weights = Weights::new(&CostWeights { q: Mat::identity(2, 2), r: Mat::identity(1, 1) }).unwrap();
+        let lyapunov = lyapunov(polytope.len(), rate);
+        DoubleSum::new(polytope, &lyapunov, &unknowns.y).performance("performance", &unknowns.l, &weights)
+    }
+
+    /// Theorem 4.4, its inequalities posed where they are broken, or at once.
+    fn posed(polytope: &Polytope, rate: f64, is_lazy: bool) -> Posed {
+        let lyapunov = lyapunov(polytope.len(), rate);
+        let mut problem = Problem::new();
+        let unknowns = Unknowns::new(&mut problem, polytope, &lyapunov);
+        let sum = DoubleSum::new(polytope, &lyapunov, &unknowns.y);
+        for (k, (name, block)) in blocks(polytope, rate, &unknowns).into_iter().enumerate() {
+            match sum.leads(k) || !is_lazy {
+                true => problem.positive_definite(name, block),
+                false => problem.positive_definite_lazily(name, block, None, sum.family(k)),
+            }
+        }
+        let trace = unknowns.y.iter().fold(Expr::zeros(1, 1), |sum, y| sum + y.trace());
+        problem.maximize(&trace);
+        Posed { problem, unknowns }
+    }
+
+    fn solved(posed: &Posed) -> Answer {
+        let answer = posed.problem.solve(&Options::default()).unwrap();
+        assert!(matches!(answer.outcome, Outcome::Solved), "{:?}", answer.outcome);
+        answer
+    }
+
+    #[test]
+    fn generated_is_enumerated() {
+        for (count, expected) in [(4, 60), (6, 420)] {
+            let polytope = polytope(count);
+            let [generated, enumerated] = [true, false].map(|is_lazy| posed(&polytope, 0.4, is_lazy));
+            let [generated, enumerated] = [solved(&generated), solved(&enumerated)];
+            assert_eq!(generated.blocks.len(), expected);
+            let difference = (generated.objective - enumerated.objective).abs();
+            assert!(difference < 1e-6 * enumerated.objective, "{count}: {difference:e}");
+            assert!(generated.blocks.iter().all(|block| block.verified_lower_bound > 0.0));
+        }
+    }
+
+    /// A design for one bound on the rates, with the bound raised until the first inequality of all breaks: it is seen, wherever it is.
+    #[test]
+    fn one_rate_that_breaks_a_design_is_seen() {
+        let polytope = polytope(6);
+        let design = posed(&polytope, 0.4, true);
+        let answer = solved(&design);
+        let values = || answer.unknown_values().to_vec();
+        let broken = |rate: f64| {
+            let blocks = blocks(&polytope, rate, &design.unknowns);
+            blocks.iter().filter(|(_, block)| smallest_eigenvalue(&answer.value(block)) <= 0.0).count()
+        };
+        assert_eq!(broken(0.4), 0);
+        let (mut holds, mut breaks) = (0.4, 0.8);
+        assert!(broken(breaks) > 0);
+        for _ in 0..45 {
+            let middle = 0.5 * (holds + breaks);
+            *(if broken(middle) == 0 { &mut holds } else { &mut breaks }) = middle;
+        }
+        let of_all = broken(breaks);
+        assert!((1..=3).contains(&of_all), "{of_all}");
+        let at = |rate: f64| posed(&polytope, rate, true).problem.verify(&values()).unwrap();
+        let seen = |rate: f64| at(rate).iter().filter(|block| block.verified_lower_bound <= 0.0).count();
+        assert_eq!(seen(0.4), 0);
+        assert_eq!(seen(breaks * (1.0 + 1e-12)), of_all);
+    }
+}

@@ -64,6 +64,8 @@ pub(super) const COST_LADDER: [f64; 4] = [1e-3, 1e-2, 5e-2, 1e-1];
 pub(super) const MARGIN_LADDER: [f64; 3] = [1e-2, 1e-1, 5e-1];
 /// The knee: the effort is at most this many times that of the largest share, or of the reference.
 const KNEE: f64 = 2.0;
+/// A design that takes this many times more effort than is enough, as its first rounds see it, is not worth solving for.
+const FAR_MORE: f64 = 1.5;
 /// √(uᵀRu/xᵀQx) from which a gain counts as large: then, with some room for the effort, V is kept small relative to the running cost.
 const LARGE_GAIN: f64 = 1e3;
 /// How much more than the least τ may then be taken.
@@ -138,7 +140,7 @@ impl Stage<'_> {
         // the largest share that the solver finds a design for, which rounding may keep it from
         let mut found = None;
         for (count, &share) in ladder.iter().enumerate().rev() {
-            if let Some(second) = self.second(&answer, share, &mut begun, options)? {
+            if let Some(second) = self.second(&answer, share, &mut begun, None, options)? {
                 found = Some((count, share, second));
                 break;
             }
@@ -155,7 +157,7 @@ impl Stage<'_> {
                 return Ok(moderated(0.0, strict.unwrap_or(answer)));
             }
             for &share in &ladder[..smaller] {
-                let second = self.second(&answer, share, &mut begun, options)?;
+                let second = self.second(&answer, share, &mut begun, Some((&most, enough)), options)?;
                 if let Some(second) = second.filter(|second| self.effort(second, &most) <= enough) {
                     return Ok(moderated(share, second));
                 }
@@ -164,15 +166,17 @@ impl Stage<'_> {
         Ok(moderated(largest, most))
     }
 
-    /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it.
+    /// `first`, moved to the design of least effort with the share `share` of its optimum given back; `None` where the solver does not find it,
+    /// or where its effort would be far from `enough`: (whose ellipsoids it is measured on, how much).
     fn second(
         &self,
         first: &Answer,
         share: f64,
         begun: &mut Problem,
+        enough: Option<(&Answer, f64)>,
         options: &Options,
     ) -> Result<Option<Answer>, Error> {
-        let points = self.least_effort(first.objective, share, begun, options)?;
+        let points = self.least_effort(first.objective, share, begun, enough, options)?;
         let has_point = |point: &&Answer| {
             point.outcome.is_optimal() || matches!(point.outcome, Outcome::Inaccurate(_)) && point.objective.is_finite()
         };
@@ -217,6 +221,7 @@ impl Stage<'_> {
         optimum: f64,
         share: f64,
         begun: &mut Problem,
+        enough: Option<(&Answer, f64)>,
         options: &Options,
     ) -> Result<Vec<Answer>, Error> {
         let one = |value: f64| Expr::constant(Mat::from_fn(1, 1, |_, _| value));
@@ -237,7 +242,14 @@ impl Stage<'_> {
         }
         problem.minimize(&tau);
         let options = Options { gap_tolerance: options.gap_tolerance.max(1e-8), ..options.clone() };
-        let least_effort = problem.solve(&options)?;
+        // of what is measured at all: a sketch may miss definiteness by rounding
+        let is_hopeless = |sketch: &Answer| {
+            enough.is_some_and(|(measure, enough)| {
+                let effort = self.effort(sketch, measure);
+                effort.is_finite() && effort > FAR_MORE * enough
+            })
+        };
+        let Some(least_effort) = solve_unless(is_hopeless, &problem, &options)? else { return Ok(Vec::new()) };
         *begun = begun.beginning_with(&least_effort);
         let effort = least_effort.value(&tau)[(0, 0)];
         let large = |q: &&Mat<f64>| effort * self.condition(&least_effort, q) > LARGE_GAIN.powi(2);
@@ -249,8 +261,8 @@ impl Stage<'_> {
             problem.positive_definite_by(format!("condition at vertex {}", i + 1), block, 0.0);
         }
         problem.minimize(&nu);
-        let conditioned = problem.beginning_with(&least_effort).solve(&options)?;
-        Ok(vec![conditioned, least_effort])
+        let conditioned = solve_unless(|_| false, &problem.beginning_with(&least_effort), &options)?;
+        Ok(conditioned.into_iter().chain([least_effort]).collect())
     }
 
     /// The least ν with P ⪯ νQ at every vertex, Q ≻ 0.
@@ -275,5 +287,21 @@ impl Stage<'_> {
     fn effort_of(&self, gains: &[Mat<f64>], measure: &Answer) -> f64 {
         let y: Vec<Mat<f64>> = self.y.iter().map(|y| measure.value(y)).collect();
         largest_effort(gains, &y, self.r_inverse)
+    }
+}
+
+/// The answer, if it is not hopeless after the first rounds: by `is_hopeless`, or because these come to no point. Of a problem that is posed all
+/// at once there are no such rounds.
+fn solve_unless(
+    is_hopeless: impl Fn(&Answer) -> bool,
+    problem: &Problem,
+    options: &Options,
+) -> Result<Option<Answer>, Error> {
+    if !problem.has_lazy() {
+        return problem.solve(options).map(Some);
+    }
+    match problem.sketch(options)?.filter(|sketch| !is_hopeless(sketch)) {
+        Some(sketch) => problem.solve_sketched(&sketch, options).map(Some),
+        None => Ok(None),
     }
 }
