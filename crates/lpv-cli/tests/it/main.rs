@@ -1,5 +1,6 @@
 //! The program as a user meets it: files and arguments in; files, messages and exit codes out.
 
+mod arrows;
 mod bad_input;
 mod compleib;
 mod mutated;

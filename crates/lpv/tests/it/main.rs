@@ -6,7 +6,6 @@ mod filter;
 mod flight;
 mod governed;
 mod jacobians;
-mod layering;
 mod moving_parameter;
 mod numbers;
 mod polytopic;
