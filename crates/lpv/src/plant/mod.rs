@@ -1,7 +1,8 @@
 //! Nonlinear plants ẋ = f(x, u, w), y = h(x, v).
 //!
-//! A plant implements [`Equations`] once, generic over [`Scalar`]; the blanket implementation then gives it the
-//! dyn-safe face [`Plant`] with exact Jacobians from dual numbers. Plants are chosen by name through [`PlantSpec`].
+//! A plant implements [`Equations`] once, generic over [`Scalar`](crate::math::scalar::Scalar); the blanket
+//! implementation then gives it the dyn-safe face [`Plant`] with exact Jacobians from dual numbers. Plants are chosen by
+//! name through [`PlantSpec`].
 //!
 //! To add a plant: one file here with its `Equations`, one variant in [`PlantSpec`].
 

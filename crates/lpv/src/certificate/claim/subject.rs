@@ -41,7 +41,7 @@ pub struct Subject {
 /// Name of a claim within a certificate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ClaimId {
-    /// [`ClaimKind::name`]
+    /// [`ClaimKind::name`](super::ClaimKind::name)
     pub name: &'static str,
     /// What it is about.
     pub subject: Subject,
