@@ -225,7 +225,7 @@ pub const KNOWN: &[Known] = &[
         ],
     },
     Known {
-        why: "an assembly is filled by its blocks, and each file has the other's type as an argument",
+        why: "an assembly is planned from all blocks, and each block adds itself to it",
         against: &[("lmi/src/assembly.rs", "lmi/src/block.rs")],
     },
     Known {
@@ -302,7 +302,7 @@ pub const KNOWN: &[Known] = &[
         against: &[("lpv/src/synthesis/polytopic/regulation.rs", "lpv/src/synthesis/polytopic/stabilization.rs")],
     },
     Known {
-        why: "the effort that moderation chooses by stands in the file of the curve, which moderates",
+        why: "the effort that moderation chooses by stands in the file of the curve, which needs the shares of moderation",
         against: &[("lpv/src/synthesis/polytopic/moderation.rs", "lpv/src/synthesis/polytopic/trade_off.rs")],
     },
 ];
