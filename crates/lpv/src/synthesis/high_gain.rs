@@ -25,7 +25,7 @@
 use super::back_off::mixtures_hold;
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
 use super::slpvqr::{self, not_definite};
-use super::units::{STRICT, Units, scaled};
+use super::units::in_own_units;
 use super::{CostWeights, FrozenDesign, RateBounded, SynthesisError};
 use crate::math::eigen::spectral_radius;
 use crate::math::hold::discretize;
@@ -87,19 +87,13 @@ pub(super) fn segment(
         let FrozenDesign { rho, gain, p, trace_y, iterations, .. } = low;
         return Ok(Segment { rho, low: gain, high, trace_y, p, p_rate: None, iterations });
     }
-    if let Some(units) = Units::of(&[(&model.a, &model.b)], Some(weights), true)
-        && let (own, limits) = (units.model(model), units.limits(sigma, gamma))
-        && let Ok(segment) = of_mixtures(&own, &units.weights(weights), &limits, 1.0)
-    {
-        return Ok(Segment {
-            p: scaled(&segment.p, (1.0 + STRICT) / units.y()),
-            low: units.gain(&segment.low),
-            high: units.gain(&segment.high),
-            trace_y: units.y() * segment.trace_y / (1.0 + STRICT),
-            ..segment
-        });
-    }
-    of_mixtures(model, weights, sigma, gamma)
+    in_own_units(model, weights, (sigma, gamma), of_mixtures, |units, segment| Segment {
+        p: units.strict_p(&segment.p),
+        low: units.gain(&segment.low),
+        high: units.gain(&segment.high),
+        trace_y: units.strict_trace(segment.trace_y),
+        ..segment
+    })
 }
 
 /// All 2^m mixtures, as the problem stands, whatever the size of its numbers.

@@ -1,7 +1,7 @@
 //! SLPVQR: the quadratic regulator under input saturation, low gain, Theorem 5.3 (Theorem 5.1 without parameter).
 
 use super::inequality::{InverseWeights, performance, solve, unsaturated};
-use super::units::{STRICT, Units, scaled};
+use super::units::in_own_units;
 use super::{CostWeights, FrozenDesign, SynthesisError};
 use crate::math::matrix::{inverse_spd, symmetric_part, trace};
 use crate::model::FrozenModel;
@@ -15,19 +15,12 @@ pub(super) fn frozen(
     sigma: &[f64],
     gamma: f64,
 ) -> Result<FrozenDesign, SynthesisError> {
-    // an error, and what is refuted, is told of the problem as it is stated
-    if let Some(units) = Units::of(&[(&model.a, &model.b)], Some(weights), true)
-        && let (own, limits) = (units.model(model), units.limits(sigma, gamma))
-        && let Ok(design) = in_its_units(&own, &units.weights(weights), &limits, 1.0)
-    {
-        return Ok(FrozenDesign {
-            gain: units.gain(&design.gain),
-            p: scaled(&design.p, (1.0 + STRICT) / units.y()),
-            trace_y: units.y() * design.trace_y / (1.0 + STRICT),
-            ..design
-        });
-    }
-    in_its_units(model, weights, sigma, gamma)
+    in_own_units(model, weights, (sigma, gamma), in_its_units, |units, design| FrozenDesign {
+        gain: units.gain(&design.gain),
+        p: units.strict_p(&design.p),
+        trace_y: units.strict_trace(design.trace_y),
+        ..design
+    })
 }
 
 /// The problem as it stands, whatever the size of its numbers.

@@ -8,14 +8,16 @@
 //! Y = Y′ω/κ,   L = βL′ω/κ,   K = βK′,   P = P′κ/ω.
 //! ```
 //!
-//! A unit of states is none of its own: x in aξ has B/a, a²Q, that is another β and κ. ω = max|A|, κ = max|Q| and βⱼ² = κ/Rⱼⱼ make the largest entries of
-//! A′ and Q′ and the diagonal of R′ one; without a cost Y has its trace, κ = ω, and βⱼ makes that of every column of B′ one. They follow every change of units, and the primed numbers are rounded to 32 bits, so that what the solver sees, and where it goes,
-//! is the same to the last bit whatever the units were. (The design of least effort is often far from unique, and a last bit would choose among them.)
-//! Of rounded numbers nothing is proved: what is found is proved again as it was stated. The regulator of one vertex, which is the Riccati solution, is
-//! not rounded.
+//! A unit of states is none of its own: x in aξ has B/a, a²Q, that is another β and κ. ω = max|A|, κ = max|Q| and βⱼ² = κ/Rⱼⱼ make the largest
+//! entries of A′ and Q′ and the diagonal of R′ one; without a cost Y has its trace, κ = ω, and βⱼ makes that of every column of B′ one. They follow
+//! every change of units, and the primed numbers are rounded to 32 bits, so that what the solver sees, and where it goes, is the same to the last bit
+//! whatever the units were. (The design of least effort is often far from unique, and a last bit would choose among them.) Of rounded numbers nothing
+//! is proved: what is found is proved again as it was stated. Not rounded are the regulator of one vertex, which is the Riccati solution, and weights
+//! whose definiteness the rounding might take.
 
 use super::CostWeights;
 use crate::math::Mat;
+use crate::math::matrix::{inverse_spd, is_diagonal};
 use crate::model::FrozenModel;
 
 /// ω, β and κ.
@@ -53,7 +55,16 @@ impl Units {
             }
         };
         let has_size = inputs.iter().chain([&rate, &cost]).all(|unit| (LEAST..=1.0 / LEAST).contains(unit));
-        has_size.then_some(Self { rate, inputs, cost, has_cost: weights.is_some(), is_rounded })
+        let own = Self { rate, inputs, cost, has_cost: weights.is_some(), is_rounded };
+        let is_definite = |m: &Mat<f64>| inverse_spd(m).is_some();
+        // what a Q that is only semidefinite becomes is seen of a diagonal alone
+        let keeps_definiteness = |units: &Self| {
+            weights.is_none_or(|weights| {
+                let primed = units.weights(weights);
+                is_definite(&primed.r) && (is_diagonal(&weights.q) || is_definite(&weights.q) && is_definite(&primed.q))
+            })
+        };
+        has_size.then(|| if keeps_definiteness(&own) { own } else { Self { is_rounded: false, ..own } })
     }
 
     /// A′
@@ -115,6 +126,16 @@ impl Units {
         if self.has_cost { self.rate / self.cost } else { 1.0 }
     }
 
+    /// P of a P′ that is found for rounded numbers, made strict for those of the problem.
+    pub fn strict_p(&self, p: &Mat<f64>) -> Mat<f64> {
+        scaled(p, (1.0 + STRICT) / self.y())
+    }
+
+    /// tr Y of [`strict_p`](Self::strict_p).
+    pub fn strict_trace(&self, trace: f64) -> f64 {
+        trace * self.y() / (1.0 + STRICT)
+    }
+
     /// L of L′.
     pub fn l(&self, l: &Mat<f64>) -> Mat<f64> {
         Mat::from_fn(l.nrows(), l.ncols(), |i, j| self.inputs[i] * self.y() * l[(i, j)])
@@ -126,13 +147,33 @@ impl Units {
     }
 }
 
+/// What `solve` finds at one model in units of its own, as `as_stated` makes it of the problem as it is stated; where it finds nothing, what it finds
+/// for that: an error, and what is refuted, is told of the problem as it is stated.
+///
+/// # Errors
+/// Those of `solve`.
+pub(super) fn in_own_units<T, E>(
+    model: &FrozenModel,
+    weights: &CostWeights,
+    (sigma, gamma): (&[f64], f64),
+    solve: impl Fn(&FrozenModel, &CostWeights, &[f64], f64) -> Result<T, E>,
+    as_stated: impl FnOnce(&Units, T) -> T,
+) -> Result<T, E> {
+    if let Some(units) = Units::of(&[(&model.a, &model.b)], Some(weights), true)
+        && let Ok(found) = solve(&units.model(model), &units.weights(weights), &units.limits(sigma, gamma), 1.0)
+    {
+        return Ok(as_stated(&units, found));
+    }
+    solve(model, weights, sigma, gamma)
+}
+
 /// The largest size of an entry; 1 of zeros.
 pub(super) fn largest_entry<'a>(entries: impl IntoIterator<Item = &'a f64>) -> f64 {
     let largest = entries.into_iter().map(|x| x.abs()).fold(0.0, f64::max);
     if largest > 0.0 { largest } else { 1.0 }
 }
 
-/// ε of P(1 + ε), the least that makes an optimum found for rounded numbers one that holds for those of the problem.
+/// ε of P(1 + ε), so that an optimum found for rounded numbers holds for those of the problem.
 pub(super) const STRICT: f64 = 1e-7;
 
 /// Smallest unit: products and quotients of a few are no overflow.

@@ -217,3 +217,35 @@ fn weights_of_a_grid_have_no_size() {
         }
     }
 }
+
+/// Weights that are definite by less than the 32 bits that the solver's numbers are rounded to, and a Q of rank one.
+#[test]
+fn weights_stay_definite() {
+    let near = |size: usize, by: f64| Mat::from_fn(size, size, |i, j| if i == j { 1.0 } else { 1.0 - by });
+    let mut numbers = Numbers(22);
+    let polytope = plant(&mut numbers, (2, 2, 2));
+    for (what, request) in requests(2, 2, 2) {
+        for (q, r) in [(near(2, 1.0), near(2, 1e-10)), (near(2, 1e-10), near(2, 1.0)), (near(2, 0.0), near(2, 0.5))] {
+            let weights = request.weights.as_ref().map(|_| CostWeights { q, r });
+            let design = synthesize(&polytope, &PolytopicRequest { weights, ..request.clone() }).unwrap();
+            assert!(!design.is_infeasible(), "{what}: {:?}", design.answer.outcome);
+            let blocks = &design.answer.blocks;
+            let proved = blocks.iter().all(|block| block.verified_lower_bound >= block.margin);
+            assert!(proved || !design.is_solved(), "{what}");
+        }
+    }
+    for r in [near(4, 1e-10), near(4, 0.5)] {
+        let request = DesignRequest {
+            name: "one".into(),
+            method: Method::HighGainSlpvqr { gamma: 20.0, high_gain: HighGainOptions::default() },
+            weights: CostWeights { r, ..quadrotor::weights() },
+            grid_points: 2,
+            schedule: ScheduleKind::Grid,
+            limits: quadrotor::limits(),
+            sample_time_s: 0.002,
+            rate_bounded: None,
+        };
+        // a design or an error, and no end of another kind
+        let _ = design(&quadrotor::spec(9.807), &*quadrotor::plant(), &request, &|_| {});
+    }
+}

@@ -25,6 +25,7 @@ use super::trade_off::largest_effort;
 use crate::math::Mat;
 use crate::math::eigen::symmetric_eigenvalues;
 use crate::math::matrix::{inverse_spd, semidefinite_factor};
+use crate::synthesis::units::STRICT;
 use lmi::{Answer, Error, Expr, Options, Outcome, Problem};
 
 /// How much of the optimum is given back.
@@ -72,9 +73,6 @@ const LARGE_GAIN: f64 = 1e3;
 const EFFORT_ROOM: f64 = 4.0;
 /// ε of the strictness that is paid for rounding, as a share of what is given back, and at least.
 const STRICTNESS: (f64, f64) = (0.02, 1e-6);
-
-/// ε of an optimum of which nothing is given back.
-const LEAST_STRICTNESS: f64 = 1e-7;
 
 fn strictness(share: f64) -> f64 {
     (STRICTNESS.0 * share).max(STRICTNESS.1)
@@ -153,7 +151,7 @@ impl Stage<'_> {
         let enough = KNEE * self.effort(&most, &most).max(self.effort_of(self.reference, &most));
         if back_off == BackOff::Knee {
             if is_attained && self.effort(&answer, &most) <= enough {
-                let strict = self.problem.moved(&answer, self.strict(&answer, LEAST_STRICTNESS));
+                let strict = self.problem.moved(&answer, self.strict(&answer, STRICT));
                 return Ok(moderated(0.0, strict.unwrap_or(answer)));
             }
             for &share in &ladder[..smaller] {
